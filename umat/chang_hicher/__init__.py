@@ -1,0 +1,70 @@
+"""The fabric-enhanced Chang–Hicher micromechanical model, one stress point and many.
+
+`material` parameters and state, `contact` one contact plane, `balance` the averages over planes, `residual` the
+equations of a step, `elimination` their linear systems, `history` the chain of sub-steps, `integrate` the step
+control of each point, `pool` storage, `programs` index lists. The derivation is in `docs/theory.md`.
+"""
+
+import threading
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .. import status
+from ..directions import Directions
+from ..interface import Response, checked_vectors, elastic_tangent, initial_state, state_fields, symmetric_tangent, update
+from ..mandel import Array
+from ..threads import map_slices
+from .integrate import integrate
+from .material import ChangHicher, ChangHicherState, constants_of, rule_of, start
+from .pool import make_pool
+from .programs import programs
+
+__all__ = ["ChangHicher", "ChangHicherState"]
+
+_local = threading.local()
+
+
+def _pool(n_directions: int, total: bool) -> Any:
+    """Return this thread's storage."""
+    key = (n_directions, total)
+    if getattr(_local, "key", None) != key:
+        _local.key, _local.pool = key, make_pool(n_directions, total)
+    return _local.pool
+
+
+@update.register
+def _(material: ChangHicher, directions: Directions, strain_increment: ArrayLike, old: ChangHicherState) -> Response:
+    strain = checked_vectors("strain_increment", strain_increment, len(old.stress))
+    n = len(strain)
+    constants, rule = constants_of(material), rule_of(directions)
+    program = programs(directions.symmetry == "quarter")
+    data = (old.stress / material.reference_pressure, old.fabric, old.void_ratio, old.slip, old.force, strain)
+    stress, fabric, void_ratio, slip, force = (np.array(a) for a in data[:5])
+    tangent = np.zeros((n, 6, 6))
+    codes, errors = np.zeros(n, np.int8), np.zeros(n)
+    work, substeps = np.zeros(n, np.int32), np.zeros(n, np.int32)
+    out = (stress, fabric, void_ratio, slip, force, tangent, codes, errors, work, substeps)
+
+    def kernel(begin: int, end: int) -> None:
+        pool = _pool(len(rule.weights), constants.total)
+        integrate(material.law, constants, rule, program, pool, data, out, begin, end)
+
+    map_slices(kernel, n)
+    stress *= material.reference_pressure
+    tangent *= material.reference_pressure
+    refused = codes != status.OK
+    stress[refused] = old.stress[refused]
+    state = ChangHicherState(stress, fabric, void_ratio, slip, force)
+    return Response(stress, tangent, state, codes, errors, work)
+
+
+@initial_state.register
+def _(material: ChangHicher, directions: Directions, stress: ArrayLike, **needs: Any) -> ChangHicherState:
+    return start(material, directions, stress, **needs)
+
+
+@symmetric_tangent.register
+def _(material: ChangHicher) -> bool:
+    return False

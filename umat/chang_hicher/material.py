@@ -1,0 +1,145 @@
+"""The enhanced Chang–Hicher material (Zhao & Kruyt 2020): its parameters, its state, its start.
+
+Grain size drops out of the dimensionless system (see `contact`): force over p_ref r² and displacement over 2r leave
+√(f_ref p_ref)/k_n0 as the only elastic constant. So d50 is not a parameter here; `umat.sands` says where it went.
+"""
+
+from functools import lru_cache
+from typing import Any, Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..directions import Directions
+from ..fabric import Constant, ZhaoKruyt
+from ..interface import checked_vectors
+from ..mandel import Array, to_tensor
+from .pool import Constants, Rule
+from .programs import moment_table
+
+GROUP = 4
+
+
+class ChangHicher(NamedTuple):
+    """Parameters; k_n0, f_ref and p_ref in consistent units (MPa with N/mm and N, Pa with N/m and N, …)."""
+
+    e_ref: float  #: void ratio of the critical state line at p = 0 [-]
+    critical_slope: float  #: (λ_c) e_c = e_ref − λ_c (p/p_ref)^ξ [-]
+    critical_exponent: float  #: (ξ) [-]
+    normal_stiffness: float  #: (k_n0) of a contact at the force f_ref [force/length]
+    friction_angle: float  #: (φ_μ) between grains [deg]
+    tangential_ratio: float  #: (k_tR) k_t / k_n [-]
+    plastic_ratio: float  #: (k_pR) k_p / k_n [-]
+    reference_force: float  #: (f_ref) [force]
+    reference_pressure: float  #: (p_ref) [stress]; also the unit in which the point computes
+    law: Any = ZhaoKruyt()  #: record of a fabric law
+    localisation: Literal["total", "rate"] = "total"
+    gap_pressure: float = 1e-4  #: contact pressure below which a contact opens, over p_ref [-]
+    tolerance: float = 1e-3  #: on the local error of a sub-step: of the stress relative to its norm, of F [-]
+    max_evaluations: int = 2000  #: bound on the work of one point
+
+
+class ChangHicherState(NamedTuple):
+    """State of n points; N directions."""
+
+    stress: Array
+    """(n, 6) stress [as p_ref]."""
+    fabric: Array
+    """(n, 6) fabric anisotropy tensor (F) [-]."""
+    void_ratio: Array
+    """(n,) void ratio (e) [-]."""
+    slip: Array
+    """(n, N) accumulated sliding over the grain diameter (δ_t^p / 2r) [-]."""
+    force: Array
+    """(n, N, 3) contact forces over p_ref r² in the rate form, (n, 0, 3) in the total form, which has no use for them."""
+
+
+@lru_cache(maxsize=64)
+def constants_of(material: ChangHicher) -> Constants:
+    """Return the dimensionless constants; ValueError names a parameter that cannot be."""
+    for name in ("normal_stiffness", "friction_angle", "tangential_ratio", "plastic_ratio", "reference_force",
+                 "reference_pressure", "e_ref", "tolerance", "gap_pressure"):  # fmt: skip
+        if not getattr(material, name) > 0.0:
+            raise ValueError(f"{name} must be positive, got {getattr(material, name)}")
+    if material.localisation not in ("total", "rate"):
+        raise ValueError(f"localisation must be 'total' or 'rate', got {material.localisation!r}")
+    compliance = (material.reference_force * material.reference_pressure) ** 0.5 / material.normal_stiffness
+    elastic = (compliance, 1.0 / material.tangential_ratio, 0.5 / material.plastic_ratio, material.gap_pressure**2)
+    return Constants(
+        elastic=elastic,
+        line=(float(material.e_ref), float(material.critical_slope), float(material.critical_exponent)),
+        tan_mu=float(np.tan(np.radians(material.friction_angle))),
+        total=material.localisation == "total",
+        evolving=not isinstance(material.law, Constant),
+        tolerance=float(material.tolerance),
+        max_evaluations=int(material.max_evaluations),
+    )
+
+
+_RULES: dict[int, tuple[Directions, Rule]] = {}
+
+
+def rule_of(directions: Directions) -> Rule:
+    """Return the directions padded to whole groups with weightless copies of the first."""
+    known = _RULES.get(id(directions))
+    if known is not None and known[0] is directions:
+        return known[1]
+    if directions.mirror_axis not in (None, "z"):
+        raise ValueError(f"the mirror plane of the directions must be normal to z, not {directions.mirror_axis}")
+    missing = -len(directions.weights) % GROUP
+    normals = np.vstack([directions.normals, np.repeat(directions.normals[:1], missing, axis=0)])
+    weights = np.concatenate([directions.weights, np.zeros(missing)])
+    rule = Rule(np.ascontiguousarray(normals), weights, moment_table(normals))
+    _RULES[id(directions)] = (directions, rule)
+    return rule
+
+
+def contact_forces(material: ChangHicher, directions: Directions, stress: Array, fabric: Array, void_ratio: Array) -> Array:
+    """Return f = σ G⁻¹ n / c(e), (n, N, 3), force over p_ref r² [ZK Table 3, total form]."""
+    inverse = np.linalg.inv(np.eye(3) / 3.0 + 2.0 / 15.0 * to_tensor(fabric))
+    density = 3.0 / (2.0 * np.pi) * (13.28 - 8.0 * void_ratio) / (1.0 + void_ratio)
+    z = to_tensor(stress / material.reference_pressure) @ inverse / density[:, None, None]
+    return np.einsum("pij,aj->pai", z, directions.normals)
+
+
+def mobilised(material: ChangHicher, directions: Directions, force: Array) -> tuple[Array, Array]:
+    """Return f_n and R = |f_t| / f_n of every direction, (n, N)."""
+    normal = np.einsum("pai,ai->pa", force, directions.normals)
+    tangential = np.linalg.norm(force - normal[..., None] * directions.normals, axis=-1)
+    return normal, tangential / np.where(normal > 0.0, normal, np.nan)
+
+
+def critical_void_ratio(material: ChangHicher, p: ArrayLike) -> Array:
+    """Return e_c(p) [ZK Table 3]."""
+    ratio = np.maximum(np.asarray(p, float) / material.reference_pressure, 0.0)
+    return material.e_ref - material.critical_slope * ratio**material.critical_exponent
+
+
+def start(
+    material: ChangHicher, directions: Directions, stress: ArrayLike, *, void_ratio: ArrayLike, fabric: ArrayLike = 0.0
+) -> ChangHicherState:
+    """Return the state at the start of a path: the sliding already done is what the forces need, so nothing slips at rest.
+
+    stress: (n, 6); void_ratio: () or (n,); fabric: (6,) or (n, 6) Mandel components of F.
+    Raises ValueError if a stress lies outside the domain of the contact law, or E(n) = 1 + F:nn is not positive.
+    """
+    stress = checked_vectors("stress", stress)
+    n = len(stress)
+    void_ratio = np.broadcast_to(np.asarray(void_ratio, float), (n,)).copy()
+    fabric = np.ascontiguousarray(np.broadcast_to(np.asarray(fabric, float), (n, 6)))
+    constants = constants_of(material)
+    lowest = np.linalg.eigvalsh(to_tensor(fabric)).min() if n else 0.0
+    if lowest <= -1.0:
+        raise ValueError(f"the fabric makes the density of contacts 1 + F:nn negative ({1 + lowest:.3g})")
+    if np.any(void_ratio <= 0.0) or np.any(void_ratio >= 1.64):
+        raise ValueError("the void ratio must lie between 0 and 1.64")
+    force = contact_forces(material, directions, stress, fabric, void_ratio)
+    normal, ratio = mobilised(material, directions, force)
+    critical = critical_void_ratio(material, stress[:, :3].mean(axis=1))
+    limit = (critical / void_ratio * constants.tan_mu)[:, None]
+    if not (np.all(normal > 0.0) and np.all(ratio < limit)):
+        raise ValueError("the stress lies outside the domain of the contact law: some contact would pull or slide freely")
+    compliance, _, ease_p, _ = constants.elastic
+    slip = ease_p * compliance * np.sqrt(normal) * limit * ratio / (limit - ratio)
+    kept = force if not constants.total else np.zeros((n, 0, 3))
+    return ChangHicherState(stress, fabric, void_ratio, np.ascontiguousarray(slip), np.ascontiguousarray(kept))
