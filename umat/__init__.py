@@ -20,6 +20,7 @@ from umat.interface import (
 from umat.threads import set_threads
 
 __all__ = [
+    "ChangHicher",
     "Directions",
     "DruckerPrager",
     "Elastic",
@@ -35,6 +36,7 @@ __all__ = [
 ]
 
 _HOMES = {
+    "ChangHicher": "chang_hicher",
     "Directions": "directions",
     "DruckerPrager": "drucker_prager",
     "Elastic": "elastic",

@@ -17,20 +17,20 @@ LANES = 64 if COMPILED else 256
 
 if COMPILED:
 
-    @njit(inline="always")
+    @njit(nogil=True, error_model="numpy")
     def lanes():
         """Indices of all lanes."""
         return range(LANES)
 
-    @njit(inline="always")
+    @njit(nogil=True, error_model="numpy")
     def select(condition, yes, no):
         """Choose between two numbers."""
         return yes if condition else no
 
-    @njit(inline="always")
+    @njit(nogil=True, error_model="numpy")
     def at(row, lane):
-        """Place of a row's entry in a flat array."""
-        return row * LANES + lane
+        """Place of a row's entry in a flat array (unsigned: no test for a negative index in the inner loop)."""
+        return np.uint64(row) * np.uint64(LANES) + np.uint64(lane)
 
 else:
 
@@ -45,9 +45,15 @@ else:
         return slice(row * LANES, (row + 1) * LANES)
 
 
+@njit(nogil=True, error_model="numpy")
+def spot(row, lane):
+    """Place of one number, for loops over single lanes."""
+    return row * LANES + lane
+
+
 def rows(count: int) -> np.ndarray:
-    """Return zeroed storage for `count` rows, shape (count, LANES)."""
-    return np.zeros((count, LANES))
+    """Return zeroed storage for `count` rows, flat."""
+    return np.zeros(count * LANES)
 
 
 #: Decorator of the lane kernels: no global lock, C arithmetic, multiply–add fused (the same on every run).

@@ -2,7 +2,7 @@
 
 `material` parameters and state, `contact` one contact plane, `balance` the averages over planes, `residual` the
 equations of a step, `elimination` their linear systems, `history` the chain of sub-steps, `integrate` the step
-control of each point, `pool` storage, `programs` index lists. The derivation is in `docs/theory.md`.
+control of each point, `rows` and `pool` storage, `planes` directions and what is summed over them. The derivation is in `docs/theory.md`.
 """
 
 import threading
@@ -17,9 +17,9 @@ from ..interface import Response, checked_vectors, elastic_tangent, initial_stat
 from ..mandel import Array
 from ..threads import map_slices
 from .integrate import integrate
-from .material import ChangHicher, ChangHicherState, constants_of, rule_of, start
+from .material import ChangHicher, ChangHicherState, constants_of, elastic, fields, rule_of, start
+from .planes import terms
 from .pool import make_pool
-from .programs import programs
 
 __all__ = ["ChangHicher", "ChangHicherState"]
 
@@ -39,7 +39,7 @@ def _(material: ChangHicher, directions: Directions, strain_increment: ArrayLike
     strain = checked_vectors("strain_increment", strain_increment, len(old.stress))
     n = len(strain)
     constants, rule = constants_of(material), rule_of(directions)
-    program = programs(directions.symmetry == "quarter")
+    products = terms(directions.symmetry == "quarter")
     data = (old.stress / material.reference_pressure, old.fabric, old.void_ratio, old.slip, old.force, strain)
     stress, fabric, void_ratio, slip, force = (np.array(a) for a in data[:5])
     tangent = np.zeros((n, 6, 6))
@@ -49,7 +49,7 @@ def _(material: ChangHicher, directions: Directions, strain_increment: ArrayLike
 
     def kernel(begin: int, end: int) -> None:
         pool = _pool(len(rule.weights), constants.total)
-        integrate(material.law, constants, rule, program, pool, data, out, begin, end)
+        integrate(material.law, constants, rule, products, pool, data, out, begin, end)
 
     map_slices(kernel, n)
     stress *= material.reference_pressure
@@ -68,3 +68,13 @@ def _(material: ChangHicher, directions: Directions, stress: ArrayLike, **needs:
 @symmetric_tangent.register
 def _(material: ChangHicher) -> bool:
     return False
+
+
+@state_fields.register
+def _(material: ChangHicher, state: ChangHicherState) -> dict[str, Array]:
+    return fields(material, state)
+
+
+@elastic_tangent.register
+def _(material: ChangHicher, state: ChangHicherState) -> Array:
+    return elastic(material, state)

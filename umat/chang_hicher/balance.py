@@ -13,43 +13,18 @@ dZ = dσ G⁻¹/c − (2/15) Z dF G⁻¹ − Z (c'/c) de   (total; with Z − Z_
 
 import numpy as np
 
+from ..fabric.law import dot, plus, scaled, six
 from ..lanes import at, kernel, lanes
-from .contact import (
-    BASE,
-    DILATANCY,
-    FABRIC,
-    FORCE,
-    FORCE_OLD,
-    FRICTION,
-    GROUP,
-    MARGIN,
-    add_moments,
-    contact_plane,
-)
-from .programs import (
-    COLUMNS,
-    D,
-    D_DILATANCY,
-    D_FIRST,
-    D_FRICTION,
-    D_PLASTIC,
-    H,
-    H_PLASTIC,
-    T,
-    T_PLASTIC,
-)
+from .rows import (
+    BY_FABRIC, BY_VOID, C, COLUMN_E, COLUMN_P, COLUMNS, D_DILATANCY, D_FRICTION, D_LATE, DILATANCY, E_DILATANCY,
+    E_FRICTION, FABRIC, FABRIC_MIDDLE, FIRST, FORCE, FORCE_OLD, FRICTION, INVERSE, MARGIN, OLD, P_DILATANCY,
+    P_FRICTION, PROJECTED, PSI, PSI_P, SCALED, VOID, Y,
+)  # fmt: skip
 
 SQRT2 = 2.0**0.5
 HALF_SQRT2 = 0.5 * SQRT2
-DENSITY = 3.0 / (2.0 * np.pi)  #: of m_V r³ 2 = DENSITY (13.28 - 8 e) / (1 + e)
+DENSITY = 3.0 / (2.0 * np.pi)  #: of c(e) = DENSITY (13.28 − 8 e) / (1 + e)
 FLOOR = 0.02  #: least critical void ratio for which the law is used
-
-# rows of the unknowns and of the start of the step: stress, fabric (Mandel), void ratio
-STRESS, FABRIC_Y, VOID, STATE_ROWS = 0, 6, 12, 13
-# rows of the geometry: G_m⁻¹ (6), G_s⁻¹/c_s (6), c_s Z for dF (9), Z for de (9), and the derivatives of the friction angles:
-INVERSE, SCALED, BY_FABRIC, BY_VOID, P_FRICTION, P_DILATANCY, E_FRICTION, E_DILATANCY, PSI, PSI_P, GEOMETRY_ROWS = (
-    0, 6, 12, 21, 30, 31, 32, 33, 34, 35, 36,
-)  # fmt: skip
 
 
 @kernel
@@ -80,24 +55,24 @@ def critical_void_ratio(p, line):
 
 
 @kernel
-def geometry(y, old, work, place, line, tan_mu, total):
-    """Fill the workspace of the contact planes and the geometry rows from the trial state y and the old one."""
+def geometry(rows, line, tan_mu, total):
+    """Fill what the contact planes read and the geometry rows, from the trial state and the old one."""
     for l in lanes():
-        a, b, c = y[at(0, l)], y[at(1, l)], y[at(2, l)]
-        d, e, f = HALF_SQRT2 * y[at(3, l)], HALF_SQRT2 * y[at(4, l)], HALF_SQRT2 * y[at(5, l)]
-        fa, fb, fc = y[at(6, l)], y[at(7, l)], y[at(8, l)]
-        fd, fe, ff = HALF_SQRT2 * y[at(9, l)], HALF_SQRT2 * y[at(10, l)], HALF_SQRT2 * y[at(11, l)]
-        ma, mb, mc = 0.5 * (fa + old[at(6, l)]), 0.5 * (fb + old[at(7, l)]), 0.5 * (fc + old[at(8, l)])
-        md = 0.5 * (fd + HALF_SQRT2 * old[at(9, l)])
-        me = 0.5 * (fe + HALF_SQRT2 * old[at(10, l)])
-        mf = 0.5 * (ff + HALF_SQRT2 * old[at(11, l)])
-        work[at(20, l)], work[at(21, l)], work[at(22, l)] = ma, mb, mc
-        work[at(23, l)], work[at(24, l)], work[at(25, l)] = md, me, mf
+        a, b, c = rows[at(Y, l)], rows[at(Y + 1, l)], rows[at(Y + 2, l)]
+        d, e, f = HALF_SQRT2 * rows[at(Y + 3, l)], HALF_SQRT2 * rows[at(Y + 4, l)], HALF_SQRT2 * rows[at(Y + 5, l)]
+        fa, fb, fc = rows[at(Y + 6, l)], rows[at(Y + 7, l)], rows[at(Y + 8, l)]
+        fd, fe, ff = HALF_SQRT2 * rows[at(Y + 9, l)], HALF_SQRT2 * rows[at(Y + 10, l)], HALF_SQRT2 * rows[at(Y + 11, l)]
+        ma, mb, mc = 0.5 * (fa + rows[at(OLD + 6, l)]), 0.5 * (fb + rows[at(OLD + 7, l)]), 0.5 * (fc + rows[at(OLD + 8, l)])
+        md = 0.5 * (fd + HALF_SQRT2 * rows[at(OLD + 9, l)])
+        me = 0.5 * (fe + HALF_SQRT2 * rows[at(OLD + 10, l)])
+        mf = 0.5 * (ff + HALF_SQRT2 * rows[at(OLD + 11, l)])
+        rows[at(FABRIC_MIDDLE, l)], rows[at(FABRIC_MIDDLE + 1, l)], rows[at(FABRIC_MIDDLE + 2, l)] = ma, mb, mc
+        rows[at(FABRIC_MIDDLE + 3, l)], rows[at(FABRIC_MIDDLE + 4, l)], rows[at(FABRIC_MIDDLE + 5, l)] = md, me, mf
         ga, gb, gc, gd, ge, gf = inverse_fabric(ma, mb, mc, md, me, mf)
-        place[at(0, l)], place[at(1, l)], place[at(2, l)] = ga, gb, gc
-        place[at(3, l)], place[at(4, l)], place[at(5, l)] = gd, ge, gf
+        rows[at(INVERSE, l)], rows[at(INVERSE + 1, l)], rows[at(INVERSE + 2, l)] = ga, gb, gc
+        rows[at(INVERSE + 3, l)], rows[at(INVERSE + 4, l)], rows[at(INVERSE + 5, l)] = gd, ge, gf
         # the stress (or its increment), the fabric and the density that make the forces
-        void, void_old = y[at(12, l)], old[at(12, l)]
+        void, void_old = rows[at(Y + 12, l)], rows[at(OLD + 12, l)]
         half = 1.0
         if total:
             ga, gb, gc, gd, ge, gf = inverse_fabric(fa, fb, fc, fd, fe, ff)
@@ -105,158 +80,254 @@ def geometry(y, old, work, place, line, tan_mu, total):
         else:
             density, d_density = contact_density(0.5 * (void + void_old))
             half = 0.5
-            a, b, c = a - old[at(0, l)], b - old[at(1, l)], c - old[at(2, l)]
-            d = d - HALF_SQRT2 * old[at(3, l)]
-            e = e - HALF_SQRT2 * old[at(4, l)]
-            f = f - HALF_SQRT2 * old[at(5, l)]
+            a, b, c = a - rows[at(OLD, l)], b - rows[at(OLD + 1, l)], c - rows[at(OLD + 2, l)]
+            d = d - HALF_SQRT2 * rows[at(OLD + 3, l)]
+            e = e - HALF_SQRT2 * rows[at(OLD + 4, l)]
+            f = f - HALF_SQRT2 * rows[at(OLD + 5, l)]
         scale = 1.0 / density
         ga, gb, gc, gd, ge, gf = ga * scale, gb * scale, gc * scale, gd * scale, ge * scale, gf * scale
-        place[at(6, l)], place[at(7, l)], place[at(8, l)] = ga, gb, gc
-        place[at(9, l)], place[at(10, l)], place[at(11, l)] = gd, ge, gf
+        rows[at(SCALED, l)], rows[at(SCALED + 1, l)], rows[at(SCALED + 2, l)] = ga, gb, gc
+        rows[at(SCALED + 3, l)], rows[at(SCALED + 4, l)], rows[at(SCALED + 5, l)] = gd, ge, gf
         z0, z1, z2 = a * ga + f * gf + e * ge, a * gf + f * gb + e * gd, a * ge + f * gd + e * gc
         z3, z4, z5 = f * ga + b * gf + d * ge, f * gf + b * gb + d * gd, f * ge + b * gd + d * gc
         z6, z7, z8 = e * ga + d * gf + c * ge, e * gf + d * gb + c * gd, e * ge + d * gd + c * gc
         k = half * density
-        place[at(12, l)], place[at(13, l)], place[at(14, l)] = k * z0, k * z1, k * z2
-        place[at(15, l)], place[at(16, l)], place[at(17, l)] = k * z3, k * z4, k * z5
-        place[at(18, l)], place[at(19, l)], place[at(20, l)] = k * z6, k * z7, k * z8
-        k = -half * d_density * scale
-        place[at(21, l)], place[at(22, l)], place[at(23, l)] = k * z0, k * z1, k * z2
-        place[at(24, l)], place[at(25, l)], place[at(26, l)] = k * z3, k * z4, k * z5
-        place[at(27, l)], place[at(28, l)], place[at(29, l)] = k * z6, k * z7, k * z8
+        rows[at(BY_FABRIC, l)], rows[at(BY_FABRIC + 1, l)], rows[at(BY_FABRIC + 2, l)] = k * z0, k * z1, k * z2
+        rows[at(BY_FABRIC + 3, l)], rows[at(BY_FABRIC + 4, l)], rows[at(BY_FABRIC + 5, l)] = k * z3, k * z4, k * z5
+        rows[at(BY_FABRIC + 6, l)], rows[at(BY_FABRIC + 7, l)], rows[at(BY_FABRIC + 8, l)] = k * z6, k * z7, k * z8
+        rows[at(BY_VOID, l)] = -half * d_density * scale
         if not total:
-            z0, z1, z2 = z0 + work[at(9, l)], z1 + work[at(10, l)], z2 + work[at(11, l)]
-            z3, z4, z5 = z3 + work[at(12, l)], z4 + work[at(13, l)], z5 + work[at(14, l)]
-            z6, z7, z8 = z6 + work[at(15, l)], z7 + work[at(16, l)], z8 + work[at(17, l)]
-        work[at(0, l)], work[at(1, l)], work[at(2, l)] = z0, z1, z2
-        work[at(3, l)], work[at(4, l)], work[at(5, l)] = z3, z4, z5
-        work[at(6, l)], work[at(7, l)], work[at(8, l)] = z6, z7, z8
-    friction(y, old, work, place, line, tan_mu)
+            z0, z1, z2 = z0 + rows[at(FORCE_OLD, l)], z1 + rows[at(FORCE_OLD + 1, l)], z2 + rows[at(FORCE_OLD + 2, l)]
+            z3, z4, z5 = z3 + rows[at(FORCE_OLD + 3, l)], z4 + rows[at(FORCE_OLD + 4, l)], z5 + rows[at(FORCE_OLD + 5, l)]
+            z6, z7, z8 = z6 + rows[at(FORCE_OLD + 6, l)], z7 + rows[at(FORCE_OLD + 7, l)], z8 + rows[at(FORCE_OLD + 8, l)]
+        rows[at(FORCE, l)], rows[at(FORCE + 1, l)], rows[at(FORCE + 2, l)] = z0, z1, z2
+        rows[at(FORCE + 3, l)], rows[at(FORCE + 4, l)], rows[at(FORCE + 5, l)] = z3, z4, z5
+        rows[at(FORCE + 6, l)], rows[at(FORCE + 7, l)], rows[at(FORCE + 8, l)] = z6, z7, z8
+    friction(rows, line, tan_mu)
 
 
 @kernel
-def friction(y, old, work, place, line, tan_mu):
+def friction(rows, line, tan_mu):
     """Fill tanφ_p (end), tanφ_d and ψ (middle) and their derivatives; start the margin with the law's own range."""
     for l in lanes():
-        p = (y[at(0, l)] + y[at(1, l)] + y[at(2, l)]) / 3.0
-        p_old = (old[at(0, l)] + old[at(1, l)] + old[at(2, l)]) / 3.0
-        void, void_old = y[at(12, l)], old[at(12, l)]
+        p = (rows[at(Y, l)] + rows[at(Y + 1, l)] + rows[at(Y + 2, l)]) / 3.0
+        p_old = (rows[at(OLD, l)] + rows[at(OLD + 1, l)] + rows[at(OLD + 2, l)]) / 3.0
+        void, void_old = rows[at(Y + 12, l)], rows[at(OLD + 12, l)]
         critical, slope = critical_void_ratio(p, line)
         critical_old, _ = critical_void_ratio(p_old, line)
-        work[at(26, l)] = np.minimum(critical - FLOOR, p)
+        rows[at(MARGIN, l)] = np.minimum(critical - FLOOR, p)
         critical, critical_old = np.maximum(critical, FLOOR), np.maximum(critical_old, FLOOR)
         i_void, i_critical = 1.0 / void, 1.0 / critical
         tan_p = critical * i_void * tan_mu
         tan_d = void * i_critical * tan_mu
-        work[at(18, l)] = tan_p
-        work[at(19, l)] = 0.5 * (tan_d + void_old / critical_old * tan_mu)
-        place[at(30, l)], place[at(31, l)] = tan_p * i_critical * slope, -0.5 * tan_d * i_critical * slope
-        place[at(32, l)], place[at(33, l)] = -tan_p * i_void, 0.5 * tan_d * i_void
+        rows[at(FRICTION, l)] = tan_p
+        rows[at(DILATANCY, l)] = 0.5 * (tan_d + void_old / critical_old * tan_mu)
+        rows[at(P_FRICTION, l)], rows[at(P_DILATANCY, l)] = tan_p * i_critical * slope, -0.5 * tan_d * i_critical * slope
+        rows[at(E_FRICTION, l)], rows[at(E_DILATANCY, l)] = -tan_p * i_void, 0.5 * tan_d * i_void
         middle, slope = critical_void_ratio(0.5 * (p + p_old), line)
-        place[at(34, l)], place[at(35, l)] = 0.5 * (void + void_old) - middle, slope
+        rows[at(PSI, l)], rows[at(PSI_P, l)] = 0.5 * (void + void_old) - middle, slope
 
 
 @kernel
-def contract(out, coefficient, a, b, terms):
-    """Add coefficient · a · b to the rows of `out`, term by term."""
-    for t in range(terms.shape[0]):
-        k = coefficient[t]
-        target, first, second = out[terms[t, 0]], a[terms[t, 1]], b[terms[t, 2]]
+def nine(rows, first, l):
+    """Return nine rows as a tuple."""
+    return (
+        rows[at(first, l)], rows[at(first + 1, l)], rows[at(first + 2, l)],
+        rows[at(first + 3, l)], rows[at(first + 4, l)], rows[at(first + 5, l)],
+        rows[at(first + 6, l)], rows[at(first + 7, l)], rows[at(first + 8, l)],
+    )  # fmt: skip
+
+
+@kernel
+def symmetric(rows, first, l):
+    """Return six plain rows as the nine entries of a symmetric matrix."""
+    xx, yy, zz = rows[at(first, l)], rows[at(first + 1, l)], rows[at(first + 2, l)]
+    yz, xz, xy = rows[at(first + 3, l)], rows[at(first + 4, l)], rows[at(first + 5, l)]
+    return (xx, xy, xz, xy, yy, yz, xz, yz, zz)
+
+
+@kernel
+def times(a, b):
+    """Return the product of two 3 × 3 matrices."""
+    return (
+        a[0] * b[0] + a[1] * b[3] + a[2] * b[6],
+        a[0] * b[1] + a[1] * b[4] + a[2] * b[7],
+        a[0] * b[2] + a[1] * b[5] + a[2] * b[8],
+        a[3] * b[0] + a[4] * b[3] + a[5] * b[6],
+        a[3] * b[1] + a[4] * b[4] + a[5] * b[7],
+        a[3] * b[2] + a[4] * b[5] + a[5] * b[8],
+        a[6] * b[0] + a[7] * b[3] + a[8] * b[6],
+        a[6] * b[1] + a[7] * b[4] + a[8] * b[7],
+        a[6] * b[2] + a[7] * b[5] + a[8] * b[8],
+    )
+
+
+@kernel
+def mandel(a):
+    """Return the Mandel components of the symmetric part of a matrix; also of its gradient by a symmetric tensor."""
+    return (
+        a[0], a[4], a[8],
+        HALF_SQRT2 * (a[5] + a[7]), HALF_SQRT2 * (a[2] + a[6]), HALF_SQRT2 * (a[1] + a[3]),
+    )  # fmt: skip
+
+
+@kernel
+def store(rows, first, l, values):
+    """Write six rows."""
+    rows[at(first, l)], rows[at(first + 1, l)], rows[at(first + 2, l)] = values[0], values[1], values[2]
+    rows[at(first + 3, l)], rows[at(first + 4, l)], rows[at(first + 5, l)] = values[3], values[4], values[5]
+
+
+@kernel
+def store_nine(rows, first, l, values):
+    """Write nine rows."""
+    rows[at(first, l)], rows[at(first + 1, l)], rows[at(first + 2, l)] = values[0], values[1], values[2]
+    rows[at(first + 3, l)], rows[at(first + 4, l)], rows[at(first + 5, l)] = values[3], values[4], values[5]
+    rows[at(first + 6, l)], rows[at(first + 7, l)], rows[at(first + 8, l)] = values[6], values[7], values[8]
+
+
+@kernel
+def transform(rows, stiffness):
+    """Fill C_{ik,mn} = G_jm⁻¹ H_{ik,jl} SCALED_ln from the rows of H."""
+    for ik in range(9):
         for l in lanes():
-            target[l] += k * first[l] * second[l]
+            c = times(
+                times(symmetric(rows, INVERSE, l), symmetric(rows, stiffness + 6 * ik, l)), symmetric(rows, SCALED, l)
+            )
+            store_nine(rows, C + 9 * ik, l, c)
 
 
 @kernel
-def contract_plain(out, a, b, terms):
-    """Add a · b to the rows of `out`, term by term."""
-    for t in range(terms.shape[0]):
-        target, first, second = out[terms[t, 0]], a[terms[t, 1]], b[terms[t, 2]]
-        for l in lanes():
-            target[l] += first[l] * second[l]
+def project(rows, displacement, strain):
+    """Fill the strain sym(D G_m⁻¹), Mandel, and the matrix itself."""
+    for l in lanes():
+        product = times(nine(rows, displacement, l), symmetric(rows, INVERSE, l))
+        store_nine(rows, PROJECTED, l, product)
+        store(rows, strain, l, mandel(product))
 
 
 @kernel
-def spread(out, coefficient, a, terms):
-    """Add coefficient · a to the rows of `out`, term by term."""
-    for t in range(terms.shape[0]):
-        k = coefficient[t]
-        target, first = out[terms[t, 0]], a[terms[t, 1]]
-        for l in lanes():
-            target[l] += k * first[l]
+def friction_columns(rows):
+    """Fill the derivatives of the strain by p and by e through the friction angles, and the first-order part."""
+    for l in lanes():
+        a, b = nine(rows, D_FRICTION, l), symmetric(rows, D_DILATANCY, l)
+        g = symmetric(rows, INVERSE, l)
+        store(rows, COLUMN_P, l, mandel(times(mixed(a, rows[at(P_FRICTION, l)], b, rows[at(P_DILATANCY, l)]), g)))
+        store(rows, COLUMN_E, l, mandel(times(mixed(a, rows[at(E_FRICTION, l)], b, rows[at(E_DILATANCY, l)]), g)))
+        store(rows, FIRST, l, mandel(times(nine(rows, D_LATE, l), g)))
 
 
 @kernel
-def sum_planes(sums, work, base, sliding, sliding_new, buffer, rule, elastic, program, total, evolving):
-    """Sum displacement, its moments and derivatives over all contact planes."""
-    normals, weights, table = rule
-    sums[:] = 0.0
-    flat = work.reshape(-1)
-    for first in range(0, weights.shape[0], GROUP):
-        for k in range(GROUP):
-            a = first + k
-            if not total:
-                work[BASE] = base[3 * a]
-                work[BASE + 1] = base[3 * a + 1]
-                work[BASE + 2] = base[3 * a + 2]
-            n = (normals[a, 0], normals[a, 1], normals[a, 2])
-            contact_plane(flat, sliding[a], sliding_new[a], buffer[k].reshape(-1), n, weights[a], elastic)
-        add_moments(sums, buffer, table, first, program.moments)
-        if evolving:
-            add_moments(sums, buffer, table, first, program.moments_fabric)
+def mixed(a, x, b, y):
+    """Return x a + y b of nine entries."""
+    return (
+        x * a[0] + y * b[0], x * a[1] + y * b[1], x * a[2] + y * b[2],
+        x * a[3] + y * b[3], x * a[4] + y * b[4], x * a[5] + y * b[5],
+        x * a[6] + y * b[6], x * a[7] + y * b[7], x * a[8] + y * b[8],
+    )  # fmt: skip
 
 
 @kernel
-def combine(out, a, by_a, b, by_b):
-    """Set nine rows of `out` to a·by_a + b·by_b, b a symmetric tensor in six rows."""
-    for i in range(3):
-        for j in range(3):
-            k = i if i == j else 6 - i - j
-            target, first, second = out[3 * i + j], a[3 * i + j], b[k]
-            for l in lanes():
-                target[l] = first[l] * by_a[l] + second[l] * by_b[l]
+def by_force(rows, slope, i, j, row, share, total, evolving):
+    """Fill one row of a slope: strain ij through the forces, by stress, by fabric (if it evolves) and by void ratio.
 
-
-@kernel
-def strain_and_slope(strain, slope, geo, scratch, sums, place, program, rows, evolving):
-    """Fill the step's strain (6 rows) and its derivative by stress, fabric and void ratio (6 × 13 rows).
-
-    rows: first rows in `sums` of D, H and T, and of the friction's and dilatancy's D (the same for total and plastic);
-    geo: 6 × 6 rows, the part of the derivative by the fabric that comes from the density of contacts and G_m;
-    scratch: 9 + 9 + 81 + 81 rows.
+    share (C_{ik,jm} + C_{jk,im}) is the derivative by σ_km; the void ratio scales the forces as the stress does.
     """
-    row_d, row_h, row_t = rows
-    nine, product = scratch[:9], scratch[9:18]
-    b, c = scratch[18:99], scratch[99:180]
-    inverse, scaled = place[INVERSE : INVERSE + 6], place[SCALED : SCALED + 6]
-    displacement, stiffness = sums[row_d : row_d + 9], sums[row_h : row_h + 54]
-    strain[:] = 0.0
-    slope[:] = 0.0
-    scratch[:] = 0.0
-    contract(strain, program.strain_coefficient, displacement, inverse, program.strain)
-    contract_plain(b, stiffness, inverse, program.left)
-    contract_plain(c, b, scaled, program.right)
-    if evolving:
-        density = sums[row_t : row_t + 30]
-        contract_plain(product, displacement, inverse, program.product)
-        contract(slope, program.by_density_coefficient, density, inverse, program.by_density)
-        contract(slope, program.by_inverse_coefficient, product, inverse, program.by_inverse)
-        for i in range(6):
-            geo[6 * i : 6 * i + 6] = slope[COLUMNS * i + 6 : COLUMNS * i + 12]
-        contract(slope, program.by_force_coefficient, c, place[BY_FABRIC : BY_FABRIC + 9], program.by_force)
-    spread(slope, program.by_stress_coefficient, c, program.by_stress)
-    # through the friction angles: by p, then by e
-    column = scratch[18:24]
-    column[:] = 0.0
-    combine(nine, sums[D_FRICTION : D_FRICTION + 9], place[P_FRICTION], sums[D_DILATANCY : D_DILATANCY + 6], place[P_DILATANCY])
-    contract(column, program.strain_coefficient, nine, inverse, program.strain)
-    for i in range(6):
-        for k in range(3):
-            target, entry = slope[COLUMNS * i + k], column[i]
-            for l in lanes():
-                target[l] += entry[l] / 3.0
-    column[:] = 0.0
-    combine(nine, sums[D_FRICTION : D_FRICTION + 9], place[E_FRICTION], sums[D_DILATANCY : D_DILATANCY + 6], place[E_DILATANCY])
-    contract_plain(nine, stiffness, place[BY_VOID : BY_VOID + 9], program.by_rate)
-    contract(column, program.strain_coefficient, nine, inverse, program.strain)
-    for i in range(6):
-        slope[COLUMNS * i + VOID] = column[i]
+    at_i, at_j = C + 27 * i + 3 * j, C + 27 * j + 3 * i
+    for l in lanes():
+        k0 = share * (rows[at(at_i, l)] + rows[at(at_j, l)])
+        k1 = share * (rows[at(at_i + 1, l)] + rows[at(at_j + 1, l)])
+        k2 = share * (rows[at(at_i + 2, l)] + rows[at(at_j + 2, l)])
+        k3 = share * (rows[at(at_i + 9, l)] + rows[at(at_j + 9, l)])
+        k4 = share * (rows[at(at_i + 10, l)] + rows[at(at_j + 10, l)])
+        k5 = share * (rows[at(at_i + 11, l)] + rows[at(at_j + 11, l)])
+        k6 = share * (rows[at(at_i + 18, l)] + rows[at(at_j + 18, l)])
+        k7 = share * (rows[at(at_i + 19, l)] + rows[at(at_j + 19, l)])
+        k8 = share * (rows[at(at_i + 20, l)] + rows[at(at_j + 20, l)])
+        k = (k0, k1, k2, k3, k4, k5, k6, k7, k8)
+        s = mandel(k)
+        if total:
+            scale = dot(s, six(rows, Y, l))
+        else:
+            scale = dot(s, six(rows, Y, l)) - dot(s, six(rows, OLD, l))
+        p = rows[at(COLUMN_P + row, l)] / 3.0
+        store(rows, slope, l, (s[0] + p, s[1] + p, s[2] + p, s[3], s[4], s[5]))
+        rows[at(slope + VOID, l)] = scale * rows[at(BY_VOID, l)] + rows[at(COLUMN_E + row, l)]
+        if evolving:
+            f = mandel(times(transposed(nine(rows, BY_FABRIC, l)), k))
+            store(rows, slope + FABRIC, l, scaled(-2.0 / 15.0, f))
+
+
+@kernel
+def transposed(a):
+    """Return the transpose of nine entries."""
+    return (a[0], a[3], a[6], a[1], a[4], a[7], a[2], a[5], a[8])
+
+
+@kernel
+def by_density(rows, slope, geo, third, i, j, share):
+    """Add to one row of a slope, and keep, the derivative by F through the density of contacts and through G_m⁻¹."""
+    j0, j1, j2 = pair_row(0, j), pair_row(1, j), pair_row(2, j)
+    i0, i1, i2 = pair_row(0, i), pair_row(1, i), pair_row(2, i)
+    for l in lanes():
+        gj = (rows[at(j0, l)], rows[at(j1, l)], rows[at(j2, l)])
+        gi = (rows[at(i0, l)], rows[at(i1, l)], rows[at(i2, l)])
+        ai, bi, ci = half_share(rows, third + 10 * i, gj, l)
+        aj, bj, cj = half_share(rows, third + 10 * j, gi, l)
+        di, dj = PROJECTED + 3 * i, PROJECTED + 3 * j
+        pi = (rows[at(di, l)], rows[at(di + 1, l)], rows[at(di + 2, l)])
+        pj = (rows[at(dj, l)], rows[at(dj + 1, l)], rows[at(dj + 2, l)])
+        m = mandel(mixed(outer(pi, gj), 1.0, outer(pj, gi), 1.0))
+        values = (
+            share * (0.5 * (ai[0] + aj[0]) - m[0] / 15.0),
+            share * (0.5 * (ai[1] + aj[1]) - m[1] / 15.0),
+            share * (0.5 * (bi[0] + bj[0]) - m[2] / 15.0),
+            share * (HALF_SQRT2 * (bi[1] + bj[1]) - m[3] / 15.0),
+            share * (HALF_SQRT2 * (ci[0] + cj[0]) - m[4] / 15.0),
+            share * (HALF_SQRT2 * (ci[1] + cj[1]) - m[5] / 15.0),
+        )
+        store(rows, geo, l, values)
+        store(rows, slope + FABRIC, l, plus(six(rows, slope + FABRIC, l), values))
+
+
+@kernel
+def pair_row(q, j):
+    """Return the row of G_m⁻¹'s entry q j."""
+    return INVERSE + (q if q == j else 6 - q - j)
+
+
+@kernel
+def outer(a, b):
+    """Return the nine entries a_i b_j."""
+    return (a[0] * b[0], a[0] * b[1], a[0] * b[2], a[1] * b[0], a[1] * b[1], a[1] * b[2],
+            a[2] * b[0], a[2] * b[1], a[2] * b[2])  # fmt: skip
+
+
+@kernel
+def half_share(rows, t, g, l):
+    """Return Σ_q T_{q,ab} g_q as ((xx, yy), (zz, yz), (xz, xy)); T in the order of `planes.TRIPLE`."""
+    x, y, z = g
+    # xxx xxy xxz xyy xyz xzz yyy yyz yzz zzz
+    t0, t1, t2, t3, t4 = rows[at(t, l)], rows[at(t + 1, l)], rows[at(t + 2, l)], rows[at(t + 3, l)], rows[at(t + 4, l)]
+    t5, t6, t7, t8, t9 = (
+        rows[at(t + 5, l)], rows[at(t + 6, l)], rows[at(t + 7, l)], rows[at(t + 8, l)], rows[at(t + 9, l)],
+    )  # fmt: skip
+    return (
+        (t0 * x + t1 * y + t2 * z, t3 * x + t6 * y + t7 * z),
+        (t5 * x + t8 * y + t9 * z, t4 * x + t7 * y + t8 * z),
+        (t2 * x + t4 * y + t5 * z, t1 * x + t3 * y + t4 * z),
+    )
+
+
+@kernel
+def strain_and_slope(rows, displacement, stiffness, third, strain, slope, geo, total, evolving):
+    """Fill a strain (all of it, or its plastic part) and its derivative, from the rows of its D, H and T."""
+    project(rows, displacement, strain)
+    transform(rows, stiffness)
+    for row in range(6):
+        i = row if row < 3 else (1 if row == 3 else 0)
+        j = row if row < 3 else (2 if row < 5 else 1)
+        share = 0.5 if row < 3 else HALF_SQRT2
+        by_force(rows, slope + COLUMNS * row, i, j, row, share, total, evolving)
+        if evolving:
+            by_density(rows, slope + COLUMNS * row, geo + 6 * row, third, i, j, share)

@@ -15,32 +15,36 @@ normal force and the tangential force vector, R = |f_t| / f_n, and `o` the start
 
 import numpy as np
 
-from ..lanes import at, kernel, lanes, select
-from .programs import BUFFER_ROWS
+from ..lanes import LANES, at, kernel, lanes, select
+from .rows import (
+    BARE, BARE_SLIPPED, BASE, BUFFER, BY_DILATANCY, BY_FRICTION, D, D_DILATANCY, D_FRICTION, D_LATE, D_SLIPPED,
+    DILATANCY, DISPLACEMENT, FABRIC_MIDDLE, FORCE, FORCE_OLD, FRICTION, H, H_SLIPPED, LATE, MARGIN, SLIPPED,
+    STIFFNESS, STIFFNESS_SLIPPED, SUMS, T, T_SLIPPED,
+)  # fmt: skip
 
-# rows of the lanes' workspace that a contact plane reads (and the margin, which it lowers)
-FORCE, FORCE_OLD, FRICTION, DILATANCY, FABRIC, MARGIN, BASE, PLANE_ROWS = 0, 9, 18, 19, 20, 26, 27, 30
 TINY = 1e-200
+SIZE = BUFFER * LANES
+GROUP = 4  #: directions whose contributions are added in one pass over the sums
 
 
 @kernel
-def contact_plane(work, sliding, sliding_new, out, n, weight, elastic):
+def contact_plane(rows, before, after, out, n, weight, elastic):
     """Fill one direction's buffer `out` with displacements and their derivatives, times the direction's weight.
 
-    work: the lanes' rows `FORCE`…`BASE`, flat; sliding, sliding_new: this direction's row; out: `BUFFER_ROWS` rows, flat;
-    elastic: (compliance, 1/k_tR, 1/(2 k_pR), f_gap²).
+    rows: the lanes, flat; before, after: rows of the sliding done before and after the step; out: `BUFFER` rows, flat
+    (arrays of their own, and constant places in them, or the compiler sees too many overlaps to check); elastic: (compliance, 1/k_tR, 1/(2 k_pR), f_gap²).
     """
     compliance, ease_t, ease_p, gap = elastic
     nx, ny, nz = n
     for l in lanes():
         # forces
-        bx, by, bz = work[at(27, l)], work[at(28, l)], work[at(29, l)]
-        fx = bx + work[at(0, l)] * nx + work[at(1, l)] * ny + work[at(2, l)] * nz
-        fy = by + work[at(3, l)] * nx + work[at(4, l)] * ny + work[at(5, l)] * nz
-        fz = bz + work[at(6, l)] * nx + work[at(7, l)] * ny + work[at(8, l)] * nz
-        gx = bx + work[at(9, l)] * nx + work[at(10, l)] * ny + work[at(11, l)] * nz
-        gy = by + work[at(12, l)] * nx + work[at(13, l)] * ny + work[at(14, l)] * nz
-        gz = bz + work[at(15, l)] * nx + work[at(16, l)] * ny + work[at(17, l)] * nz
+        bx, by, bz = rows[at(BASE, l)], rows[at(BASE + 1, l)], rows[at(BASE + 2, l)]
+        fx = bx + rows[at(FORCE, l)] * nx + rows[at(FORCE + 1, l)] * ny + rows[at(FORCE + 2, l)] * nz
+        fy = by + rows[at(FORCE + 3, l)] * nx + rows[at(FORCE + 4, l)] * ny + rows[at(FORCE + 5, l)] * nz
+        fz = bz + rows[at(FORCE + 6, l)] * nx + rows[at(FORCE + 7, l)] * ny + rows[at(FORCE + 8, l)] * nz
+        gx = bx + rows[at(FORCE_OLD, l)] * nx + rows[at(FORCE_OLD + 1, l)] * ny + rows[at(FORCE_OLD + 2, l)] * nz
+        gy = by + rows[at(FORCE_OLD + 3, l)] * nx + rows[at(FORCE_OLD + 4, l)] * ny + rows[at(FORCE_OLD + 5, l)] * nz
+        gz = bz + rows[at(FORCE_OLD + 6, l)] * nx + rows[at(FORCE_OLD + 7, l)] * ny + rows[at(FORCE_OLD + 8, l)] * nz
         fn = fx * nx + fy * ny + fz * nz
         gn = np.maximum(gx * nx + gy * ny + gz * nz, 1e-30)
         tx, ty, tz = fx - fn * nx, fy - fn * ny, fz - fn * nz
@@ -48,16 +52,16 @@ def contact_plane(work, sliding, sliding_new, out, n, weight, elastic):
         ft = np.sqrt(tx * tx + ty * ty + tz * tz + TINY)
         ux, uy, uz = 0.5 * (tx + hx), 0.5 * (ty + hy), 0.5 * (tz + hz)
         um = np.sqrt(ux * ux + uy * uy + uz * uz + TINY)
-        tan_p, tan_d = work[at(18, l)], work[at(19, l)]
+        tan_p, tan_d = rows[at(FRICTION, l)], rows[at(DILATANCY, l)]
         room = tan_p * fn - ft
         density = 1.0 + (
-            work[at(20, l)] * nx * nx
-            + work[at(21, l)] * ny * ny
-            + work[at(22, l)] * nz * nz
-            + 2.0 * (work[at(23, l)] * ny * nz + work[at(24, l)] * nx * nz + work[at(25, l)] * nx * ny)
+            rows[at(FABRIC_MIDDLE, l)] * nx * nx
+            + rows[at(FABRIC_MIDDLE + 1, l)] * ny * ny
+            + rows[at(FABRIC_MIDDLE + 2, l)] * nz * nz
+            + 2.0 * (rows[at(FABRIC_MIDDLE + 3, l)] * ny * nz + rows[at(FABRIC_MIDDLE + 4, l)] * nx * nz + rows[at(FABRIC_MIDDLE + 5, l)] * nx * ny)
         )
         # inside only if force and density are positive; the arithmetic below stays finite in any case
-        work[at(26, l)] = np.minimum(work[at(26, l)], np.minimum(room / gn, density))
+        rows[at(MARGIN, l)] = np.minimum(rows[at(MARGIN, l)], np.minimum(room / gn, density))
         fn = np.maximum(fn, 1e-30)
         room = np.maximum(room, 1e-12 * fn)
         w = weight * density
@@ -81,10 +85,10 @@ def contact_plane(work, sliding, sliding_new, out, n, weight, elastic):
         ratio = ft * i_fn
         need = ease_p * compliance * tan_p
         required = need * s * ft * i_room
-        before = sliding[l]
-        slip = np.maximum(required - before, 0.0)
-        on = select(required > before, 1.0, 0.0)
-        sliding_new[l] = before + slip
+        done = before[l]
+        slip = np.maximum(required - done, 0.0)
+        on = select(required > done, 1.0, 0.0)
+        after[l] = done + slip
         ax, ay, az = tx * i_ft, ty * i_ft, tz * i_ft
         by_ratio = need * s * tan_p * fn * fn * i_room * i_room
         along_n = required * 0.5 * i_fn - by_ratio * ratio * i_fn
@@ -113,43 +117,68 @@ def contact_plane(work, sliding, sliding_new, out, n, weight, elastic):
         px, py, pz = slip * mx, slip * my, slip * mz
         sx, sy, sz = c * ex + px, c * ey + py, c * ez + pz
         # everything out, times its weight
-        out[at(0, l)], out[at(1, l)], out[at(2, l)] = w * sx, w * sy, w * sz
-        out[at(3, l)], out[at(4, l)], out[at(5, l)] = w * px, w * py, w * pz
+        out[at(DISPLACEMENT, l)], out[at(DISPLACEMENT + 1, l)], out[at(DISPLACEMENT + 2, l)] = w * sx, w * sy, w * sz
+        out[at(SLIPPED, l)], out[at(SLIPPED + 1, l)], out[at(SLIPPED + 2, l)] = w * px, w * py, w * pz
         lag = w * slip
-        out[at(6, l)] = lag * (ax - ux + late * nx)
-        out[at(7, l)] = lag * (ay - uy + late * ny)
-        out[at(8, l)] = lag * (az - uz + late * nz)
-        out[at(9, l)], out[at(10, l)], out[at(11, l)] = w * by_tan * mx, w * by_tan * my, w * by_tan * mz
-        out[at(12, l)] = lag
+        out[at(LATE, l)] = lag * (ax - ux + late * nx)
+        out[at(LATE + 1, l)] = lag * (ay - uy + late * ny)
+        out[at(LATE + 2, l)] = lag * (az - uz + late * nz)
+        out[at(BY_FRICTION, l)], out[at(BY_FRICTION + 1, l)], out[at(BY_FRICTION + 2, l)] = w * by_tan * mx, w * by_tan * my, w * by_tan * mz
+        out[at(BY_DILATANCY, l)] = lag
         cn, ct = w * c * (1.0 - ease_t), w * c * ease_t
         wd = w * dc
-        out[at(13, l)] = ct + cn * nx * nx + wd * ex * nx + w * pxx
-        out[at(14, l)] = cn * nx * ny + wd * ex * ny + w * pxy
-        out[at(15, l)] = cn * nx * nz + wd * ex * nz + w * pxz
-        out[at(16, l)] = cn * nx * ny + wd * ey * nx + w * pyx
-        out[at(17, l)] = ct + cn * ny * ny + wd * ey * ny + w * pyy
-        out[at(18, l)] = cn * ny * nz + wd * ey * nz + w * pyz
-        out[at(19, l)] = cn * nx * nz + wd * ez * nx + w * pzx
-        out[at(20, l)] = cn * ny * nz + wd * ez * ny + w * pzy
-        out[at(21, l)] = ct + cn * nz * nz + wd * ez * nz + w * pzz
-        out[at(22, l)], out[at(23, l)], out[at(24, l)] = w * pxx, w * pxy, w * pxz
-        out[at(25, l)], out[at(26, l)], out[at(27, l)] = w * pyx, w * pyy, w * pyz
-        out[at(28, l)], out[at(29, l)], out[at(30, l)] = w * pzx, w * pzy, w * pzz
-        out[at(31, l)], out[at(32, l)], out[at(33, l)] = weight * sx, weight * sy, weight * sz
-        out[at(34, l)], out[at(35, l)], out[at(36, l)] = weight * px, weight * py, weight * pz
-
-
-GROUP = 4  #: directions whose contributions are added in one pass over the sums
-GROUP_ROWS = GROUP * BUFFER_ROWS
+        out[at(STIFFNESS, l)] = ct + cn * nx * nx + wd * ex * nx + w * pxx
+        out[at(STIFFNESS + 1, l)] = cn * nx * ny + wd * ex * ny + w * pxy
+        out[at(STIFFNESS + 2, l)] = cn * nx * nz + wd * ex * nz + w * pxz
+        out[at(STIFFNESS + 3, l)] = cn * nx * ny + wd * ey * nx + w * pyx
+        out[at(STIFFNESS + 4, l)] = ct + cn * ny * ny + wd * ey * ny + w * pyy
+        out[at(STIFFNESS + 5, l)] = cn * ny * nz + wd * ey * nz + w * pyz
+        out[at(STIFFNESS + 6, l)] = cn * nx * nz + wd * ez * nx + w * pzx
+        out[at(STIFFNESS + 7, l)] = cn * ny * nz + wd * ez * ny + w * pzy
+        out[at(STIFFNESS + 8, l)] = ct + cn * nz * nz + wd * ez * nz + w * pzz
+        out[at(STIFFNESS_SLIPPED, l)], out[at(STIFFNESS_SLIPPED + 1, l)], out[at(STIFFNESS_SLIPPED + 2, l)] = w * pxx, w * pxy, w * pxz
+        out[at(STIFFNESS_SLIPPED + 3, l)], out[at(STIFFNESS_SLIPPED + 4, l)], out[at(STIFFNESS_SLIPPED + 5, l)] = w * pyx, w * pyy, w * pyz
+        out[at(STIFFNESS_SLIPPED + 6, l)], out[at(STIFFNESS_SLIPPED + 7, l)], out[at(STIFFNESS_SLIPPED + 8, l)] = w * pzx, w * pzy, w * pzz
+        out[at(BARE, l)], out[at(BARE + 1, l)], out[at(BARE + 2, l)] = weight * sx, weight * sy, weight * sz
+        out[at(BARE_SLIPPED, l)], out[at(BARE_SLIPPED + 1, l)], out[at(BARE_SLIPPED + 2, l)] = weight * px, weight * py, weight * pz
 
 
 @kernel
-def add_moments(sums, buffer, table, first, terms):
-    """Add four directions' buffered rows, times their moments of n, to the sums."""
+def add_moments(rows, buffer, table, first, terms):
+    """Add the buffered rows of `GROUP` directions, times their moments of n, to the sums, three sums at a time.
+
+    terms: (buffer row, three out rows, three columns of the moments); table: the moments of every direction.
+    """
     for t in range(terms.shape[0]):
-        row, column = terms[t, 1], terms[t, 2]
-        c0, c1, c2, c3 = table[first, column], table[first + 1, column], table[first + 2, column], table[first + 3, column]
-        total = sums[terms[t, 0]]
-        b0, b1, b2, b3 = buffer[0, row], buffer[1, row], buffer[2, row], buffer[3, row]
+        row, t0, t1, t2 = terms[t, 0], terms[t, 1], terms[t, 2], terms[t, 3]
+        c0, c1, c2 = terms[t, 4], terms[t, 5], terms[t, 6]
+        a0, a1, a2, a3 = table[first, c0], table[first + 1, c0], table[first + 2, c0], table[first + 3, c0]
+        b0, b1, b2, b3 = table[first, c1], table[first + 1, c1], table[first + 2, c1], table[first + 3, c1]
+        d0, d1, d2, d3 = table[first, c2], table[first + 1, c2], table[first + 2, c2], table[first + 3, c2]
         for l in lanes():
-            total[l] += b0[l] * c0 + b1[l] * c1 + b2[l] * c2 + b3[l] * c3
+            x0, x1 = buffer[at(row, l)], buffer[at(row + BUFFER, l)]
+            x2, x3 = buffer[at(row + 2 * BUFFER, l)], buffer[at(row + 3 * BUFFER, l)]
+            rows[at(t0, l)] += x0 * a0 + x1 * a1 + x2 * a2 + x3 * a3
+            rows[at(t1, l)] += x0 * b0 + x1 * b1 + x2 * b2 + x3 * b3
+            rows[at(t2, l)] += x0 * d0 + x1 * d1 + x2 * d2 + x3 * d3
+
+
+@kernel
+def sum_planes(rows, slide, base, buffer, rule, terms, fabric_terms, elastic, total, evolving):
+    """Sum displacement, its moments and derivatives over all contact planes, into the rows from `SUMS` on."""
+    normals, weights, table = rule
+    count = weights.shape[0]
+    for i in range(SUMS * LANES, (SUMS + 210) * LANES):
+        rows[i] = 0.0
+    for first in range(0, count, GROUP):
+        for k in range(GROUP):
+            a = first + k
+            if not total:
+                for i in range(3 * LANES):
+                    rows[BASE * LANES + i] = base[3 * a * LANES + i]
+            n = (normals[a, 0], normals[a, 1], normals[a, 2])
+            before, after = slide[a * LANES : (a + 1) * LANES], slide[(count + a) * LANES : (count + a + 1) * LANES]
+            contact_plane(rows, before, after, buffer[k * SIZE : (k + 1) * SIZE], n, weights[a], elastic)
+        add_moments(rows, buffer, table, first, terms)
+        if evolving:
+            add_moments(rows, buffer, table, first, fabric_terms)

@@ -8,20 +8,48 @@ points that needed more than one sub-step pass here.
 
 import numpy as np
 
-from ..fabric.law import INPUTS
-from ..lanes import kernel
-from .balance import BY_FABRIC, BY_VOID, HALF_SQRT2, INVERSE, PSI_P, SCALED, contact_density, critical_void_ratio, inverse_fabric
-from .contact import DILATANCY, FABRIC, FORCE, FORCE_OLD, FRICTION, TINY
+from ..lanes import kernel, spot
+from .balance import HALF_SQRT2, contact_density, critical_void_ratio, inverse_fabric
+from .contact import TINY
+from .rows import (
+    BY_FABRIC, BY_VOID, DILATANCY, FABRIC_MIDDLE, FORCE, FORCE_OLD, FRICTION, GEO, INVERSE, LAW_INPUTS, LAW_SLOPE, OLD,
+    PLASTIC_GEO, PSI_P, RATIO_OLD, SCALED, VOID, Y,
+)  # fmt: skip
 
 
 @kernel
-def tensor(rows, first, l, out, factor):
-    """Fill a 3 × 3 matrix from six symmetric rows of lane l; factor is what turns the stored shear into a component."""
+def clear(a):
+    """Set a matrix to zero."""
+    for i in range(a.shape[0]):
+        for j in range(a.shape[1]):
+            a[i, j] = 0.0
+
+
+@kernel
+def assign(a, b):
+    """Copy a matrix."""
+    for i in range(a.shape[0]):
+        for j in range(a.shape[1]):
+            a[i, j] = b[i, j]
+
+
+@kernel
+def tensor(rows, first, l, out):
+    """Fill a 3 × 3 matrix from six plain rows of lane l."""
     for i in range(3):
-        out[i, i] = rows[first + i, l]
-    out[1, 2] = out[2, 1] = factor * rows[first + 3, l]
-    out[0, 2] = out[2, 0] = factor * rows[first + 4, l]
-    out[0, 1] = out[1, 0] = factor * rows[first + 5, l]
+        out[i, i] = rows[spot(first + i, l)]
+    out[1, 2] = out[2, 1] = rows[spot(first + 3, l)]
+    out[0, 2] = out[2, 0] = rows[spot(first + 4, l)]
+    out[0, 1] = out[1, 0] = rows[spot(first + 5, l)]
+
+
+@kernel
+def tensor_of_mandel(rows, first, l, out):
+    """Fill a 3 × 3 matrix from six Mandel rows of lane l."""
+    tensor(rows, first, l, out)
+    for i in range(3):
+        for j in range(3):
+            out[i, j] *= 1.0 if i == j else HALF_SQRT2
 
 
 @kernel
@@ -35,32 +63,41 @@ def column_tensor(change, first, c, out):
 
 
 @kernel
-def force_change(change, place, l, sign, out):
+def force_change(rows, change, total, l, sign, out, small):
     """Add to `out` (9, 6) the change of Z with the columns of `change` (13, 6): sign for the stress, + for the rest."""
-    s, f, g = np.zeros((3, 3)), np.zeros((3, 3)), np.zeros((3, 3))
-    tensor(place, SCALED, l, g, 1.0)
+    s, f, g, x = small[0], small[1], small[2], small[3]
+    tensor(rows, SCALED, l, g)
+    tensor_of_mandel(rows, Y, l, x)
+    if not total:
+        tensor_of_mandel(rows, OLD, l, f)
+        for i in range(3):
+            for j in range(3):
+                x[i, j] -= f[i, j]
     for c in range(6):
         column_tensor(change, 0, c, s)
         column_tensor(change, 6, c, f)
         for k in range(3):
             for n in range(3):
-                total = place[BY_VOID + 3 * k + n, l] * change[12, c]
+                whole = 0.0
                 for m in range(3):
-                    slope = sign * s[k, m]
+                    slope = sign * s[k, m] + rows[spot(BY_VOID, l)] * x[k, m] * change[VOID, c]
                     for a in range(3):
-                        slope -= 2.0 / 15.0 * place[BY_FABRIC + 3 * k + a, l] * f[a, m]
-                    total += slope * g[m, n]
-                out[3 * k + n, c] += total
+                        slope -= 2.0 / 15.0 * rows[spot(BY_FABRIC + 3 * k + a, l)] * f[a, m]
+                    whole += slope * g[m, n]
+                out[3 * k + n, c] += whole
 
 
 @kernel
-def plane_change(work, before, by_old, by_new, elastic, n, l, of_old, of_new, of_slide, of_plastic):
-    """Return slip and the derivatives of one contact plane by its old force, new force, sliding and dilatancy.
+def plane_change(rows, done, elastic, n, l, small):
+    """Return the slip of one contact plane and dλ/dtanφ_p; fill the derivatives of its displacement.
 
-    of_old, of_new: (3, 3) of the total displacement; of_plastic (3, 3): of the plastic one by the old force (the half turn
-    of the middle direction); of_slide: (3,) the direction of slip where the plane slides, else zero;
-    by_old, by_new: the forces, (3,). Also returned: dλ/df (3,) and dλ/dtanφ_p.
+    small: scratch; its matrices 4, 5, 6 become the derivatives of the displacement by the old and the new force, and of the
+    plastic one by the old force; the rows of 7 hold the old and the new force and become, in 8, the direction of slip (zero
+    where nothing slides) and dλ/df.
     """
+    of_old, of_new, of_plastic = small[4], small[5], small[6]
+    by_old, by_new, of_slide, q = small[7, 0], small[7, 1], small[8, 0], small[8, 1]
+    t, h, u = small[9, 0], small[9, 1], small[9, 2]
     compliance, ease_t, ease_p, gap = elastic
     fn, gn = 0.0, 0.0
     for i in range(3):
@@ -68,7 +105,6 @@ def plane_change(work, before, by_old, by_new, elastic, n, l, of_old, of_new, of
         gn += by_old[i] * n[i]
     gn = max(gn, 1e-30)
     ft2, um2 = TINY, TINY
-    t, h, u = np.zeros(3), np.zeros(3), np.zeros(3)
     for i in range(3):
         t[i] = by_new[i] - fn * n[i]
         h[i] = by_old[i] - gn * n[i]
@@ -76,7 +112,7 @@ def plane_change(work, before, by_old, by_new, elastic, n, l, of_old, of_new, of
         ft2 += t[i] * t[i]
         um2 += u[i] * u[i]
     ft, um = np.sqrt(ft2), np.sqrt(um2)
-    tan_p, tan_d = work[FRICTION, l], work[DILATANCY, l]
+    tan_p, tan_d = rows[spot(FRICTION, l)], rows[spot(DILATANCY, l)]
     room = tan_p * fn - ft
     s, so = np.sqrt(fn), np.sqrt(gn)
     mid, ratio = 0.5 * (fn + gn), ft / fn
@@ -86,11 +122,10 @@ def plane_change(work, before, by_old, by_new, elastic, n, l, of_old, of_new, of
     dc = 0.5 / s * (-c / (s + so) + easy * opening * (2.0 * s + so - 3.0 * shape / s))
     dc_old = 0.5 / so * (-c / (s + so) + easy * opening * (2.0 * so + s - 3.0 * shape / so))
     required = ease_p * compliance * tan_p * s * ft / room
-    slip = max(required - before, 0.0)
-    on = 1.0 if required > before else 0.0
+    slip = max(required - done, 0.0)
+    on = 1.0 if required > done else 0.0
     by_ratio = ease_p * compliance * tan_p * tan_p * s * (fn / room) ** 2
     by_tan = -on * ease_p * compliance * s * (ft / room) ** 2
-    q = np.zeros(3)
     ratio_m = um / mid
     for i in range(3):
         q[i] = on * ((0.5 * required / fn - by_ratio * ratio / fn) * n[i] + by_ratio / fn * t[i] / ft)
@@ -105,33 +140,32 @@ def plane_change(work, before, by_old, by_new, elastic, n, l, of_old, of_new, of
             of_plastic[i, k] = turn
             of_old[i, k] = -stiff + e * n[k] * dc_old + turn
             of_new[i, k] = stiff + e * n[k] * dc + of_slide[i] * q[k] + turn
-    return slip, q, by_tan
+    return slip, by_tan
 
 
 @kernel
-def carried(rule, elastic, line, tan_mu, total, work, base, sliding, place, old, change, dz, dslide, geo, evolving, out, l):
+def carried(rows, slide, base, rule, constants, change, dz, dslide, out, small, long, l):
     """Fill dε and dε^p (12, 6) through the start of the sub-step, at fixed end: `change` (13, 6), dz (9, 6), dslide (N, 6)."""
     normals, weights, _ = rule
-    sums = np.zeros((18, 6))
-    dz_new = np.zeros((9, 6))
+    elastic, line, tan_mu = constants.elastic, constants.line, constants.tan_mu
+    total, evolving = constants.total, constants.evolving
+    sums, dz_new, dilate = long[:18], long[18:27], long[27]
+    clear(sums)
+    clear(dz_new)
     if not total:
-        dz_new[:] = dz
-        force_change(change, place, l, -1.0, dz_new)
-    p = max((old[0, l] + old[1, l] + old[2, l]) / 3.0, 1e-12)
+        assign(dz_new, dz)
+        force_change(rows, change, total, l, -1.0, dz_new, small)
+    p = max((rows[spot(OLD, l)] + rows[spot(OLD + 1, l)] + rows[spot(OLD + 2, l)]) / 3.0, 1e-12)
     critical, slope = critical_void_ratio(p, line)
-    of_old, of_new, of_plastic = np.zeros((3, 3)), np.zeros((3, 3)), np.zeros((3, 3))
-    of_slide, new, before = np.zeros(3), np.zeros(3), np.zeros(3)
-    dilate = np.zeros(6)
+    of_old, of_new, of_plastic, of_slide, q = small[4], small[5], small[6], small[8, 0], small[8, 1]
     for c in range(6):
         dp = (change[0, c] + change[1, c] + change[2, c]) / 3.0
-        dilate[c] = 0.5 * tan_mu / critical * (change[12, c] - old[12, l] / critical * slope * dp)
+        dilate[c] = 0.5 * tan_mu / critical * (change[12, c] - rows[spot(OLD + VOID, l)] / critical * slope * dp)
     for a in range(weights.shape[0]):
         n = (normals[a, 0], normals[a, 1], normals[a, 2])
-        w = weights[a] * density(work, n, l)
-        forces(work, base, total, a, n, l, before, new)
-        slip, q, by_tan = plane_change(
-            work, sliding[a, l], before, new, elastic, n, l, of_old, of_new, of_slide, of_plastic
-        )
+        w = weights[a] * density(rows, n, l)
+        forces(rows, base, total, a, n, l, small)
+        slip, _ = plane_change(rows, slide[spot(a, l)], elastic, n, l, small)
         for c in range(6):
             for i in range(3):
                 plastic = -of_slide[i] * dslide[a, c] + slip * n[i] * dilate[c]
@@ -146,63 +180,65 @@ def carried(rule, elastic, line, tan_mu, total, work, base, sliding, place, old,
                 for j in range(3):
                     sums[3 * i + j, c] += w * whole * n[j]
                     sums[9 + 3 * i + j, c] += w * plastic * n[j]
-    project(sums, place, l, out)
+    project(rows, sums, l, out, small)
     for i in range(12 if evolving else 0):
         for c in range(6):
             for k in range(6):
-                out[i, c] += geo[6 * i + k, l] * change[6 + k, c]
+                place = GEO + 6 * i + k if i < 6 else PLASTIC_GEO + 6 * (i - 6) + k
+                out[i, c] += rows[spot(place, l)] * change[6 + k, c]
 
 
 @kernel
-def start_force(total, old, work, l):
+def start_force(rows, total, l):
     """Fill Z at the start of an increment: σ G⁻¹ / c(e), or nothing where forces are kept direction by direction."""
     for i in range(9):
-        work[FORCE_OLD + i, l] = 0.0
+        rows[spot(FORCE_OLD + i, l)] = 0.0
     if not total:
         return
     h = HALF_SQRT2
-    a, b, c = old[0, l], old[1, l], old[2, l]
-    d, e, f = h * old[3, l], h * old[4, l], h * old[5, l]
+    a, b, c = rows[spot(OLD, l)], rows[spot(OLD + 1, l)], rows[spot(OLD + 2, l)]
+    d, e, f = h * rows[spot(OLD + 3, l)], h * rows[spot(OLD + 4, l)], h * rows[spot(OLD + 5, l)]
     ga, gb, gc, gd, ge, gf = inverse_fabric(
-        old[6, l], old[7, l], old[8, l], h * old[9, l], h * old[10, l], h * old[11, l]
+        rows[spot(OLD + 6, l)], rows[spot(OLD + 7, l)], rows[spot(OLD + 8, l)], h * rows[spot(OLD + 9, l)], h * rows[spot(OLD + 10, l)], h * rows[spot(OLD + 11, l)]
     )
-    scale = 1.0 / contact_density(old[12, l])[0]
-    rows = (a * ga + f * gf + e * ge, a * gf + f * gb + e * gd, a * ge + f * gd + e * gc,
+    scale = 1.0 / contact_density(rows[spot(OLD + 12, l)])[0]
+    entries = (a * ga + f * gf + e * ge, a * gf + f * gb + e * gd, a * ge + f * gd + e * gc,
             f * ga + b * gf + d * ge, f * gf + b * gb + d * gd, f * ge + b * gd + d * gc,
             e * ga + d * gf + c * ge, e * gf + d * gb + c * gd, e * ge + d * gd + c * gc)  # fmt: skip
     for i in range(9):
-        work[FORCE_OLD + i, l] = rows[i] * scale
+        rows[spot(FORCE_OLD + i, l)] = entries[i] * scale
 
 
 @kernel
-def density(work, n, l):
+def density(rows, n, l):
     """Return 1 + F_m : n n."""
-    cross = work[FABRIC + 3, l] * n[1] * n[2] + work[FABRIC + 4, l] * n[0] * n[2] + work[FABRIC + 5, l] * n[0] * n[1]
-    straight = work[FABRIC, l] * n[0] ** 2 + work[FABRIC + 1, l] * n[1] ** 2 + work[FABRIC + 2, l] * n[2] ** 2
+    cross = rows[spot(FABRIC_MIDDLE + 3, l)] * n[1] * n[2] + rows[spot(FABRIC_MIDDLE + 4, l)] * n[0] * n[2] + rows[spot(FABRIC_MIDDLE + 5, l)] * n[0] * n[1]
+    straight = rows[spot(FABRIC_MIDDLE, l)] * n[0] ** 2 + rows[spot(FABRIC_MIDDLE + 1, l)] * n[1] ** 2 + rows[spot(FABRIC_MIDDLE + 2, l)] * n[2] ** 2
     return 1.0 + straight + 2.0 * cross
 
 
 @kernel
-def forces(work, base, total, a, n, l, before, new):
+def forces(rows, base, total, a, n, l, small):
     """Fill a plane's force at the start and at the end of the sub-step."""
+    before, new = small[7, 0], small[7, 1]
     for i in range(3):
-        own = 0.0 if total else base[3 * a + i, l]
+        own = 0.0 if total else base[spot(3 * a + i, l)]
         before[i], new[i] = own, own
         for m in range(3):
-            before[i] += work[FORCE_OLD + 3 * i + m, l] * n[m]
-            new[i] += work[FORCE + 3 * i + m, l] * n[m]
+            before[i] += rows[spot(FORCE_OLD + 3 * i + m, l)] * n[m]
+            new[i] += rows[spot(FORCE + 3 * i + m, l)] * n[m]
 
 
 @kernel
-def project(sums, place, l, out):
+def project(rows, sums, l, out, small):
     """Fill the Mandel strains sym(D G_m⁻¹) of the total and the plastic sum, (12, 6)."""
-    g = np.zeros((3, 3))
-    tensor(place, INVERSE, l, g, 1.0)
+    g, d = small[0], small[1]
+    tensor(rows, INVERSE, l, g)
     for part in range(2):
         for c in range(6):
-            d = np.zeros((3, 3))
             for i in range(3):
                 for j in range(3):
+                    d[i, j] = 0.0
                     for k in range(3):
                         d[i, j] += sums[9 * part + 3 * i + k, c] * g[k, j]
             first = 6 * part
@@ -214,46 +250,43 @@ def project(sums, place, l, out):
 
 
 @kernel
-def law_carried(slope, ratio_old, place, change, strain_change, out, ratio, l):
+def law_carried(rows, change, strain_change, out, ratio, l):
     """Fill (6, 6): the derivative of F − F_o − ΔF through the start; strain_change: rows 6…11 the plastic strain's."""
     for i in range(6):
-        row = INPUTS * i
+        row = LAW_SLOPE + LAW_INPUTS * i
         for c in range(6):
             dp = (change[0, c] + change[1, c] + change[2, c]) / 3.0
-            total = slope[row + 12, l] * 0.5 * (change[12, c] - place[PSI_P, l] * dp)
+            total = rows[spot(row + 12, l)] * 0.5 * (change[12, c] - rows[spot(PSI_P, l)] * dp)
             for k in range(6):
-                total += 0.5 * slope[row + k, l] * change[6 + k, c] + 0.5 * slope[row + 6 + k, l] * change[k, c]
-                total += slope[row + 25 + k, l] * strain_change[6 + k, c]
+                total += 0.5 * rows[spot(row + k, l)] * change[6 + k, c] + 0.5 * rows[spot(row + 6 + k, l)] * change[k, c]
+                total += rows[spot(row + 25 + k, l)] * strain_change[6 + k, c]
                 if ratio:
-                    total -= ratio_old[6 * i + k, l] * change[k, c]
+                    total -= rows[spot(RATIO_OLD + 6 * i + k, l)] * change[k, c]
             out[i, c] = -change[6 + i, c] - total
 
 
 @kernel
-def advance(rule, elastic, line, tan_mu, total, work, base, sliding, place, y, change, new, dz, dslide, l):
+def advance(rows, slide, base, rule, constants, change, new, dz, dslide, small, l):
     """Move dZ and dλ to the end of the sub-step, whose state depends on the increment through `new` (13, 6)."""
     normals, weights, _ = rule
+    elastic, line, total = constants.elastic, constants.line, constants.total
     if total:
-        dz[:] = 0.0
-        force_change(new, place, l, 1.0, dz)
+        clear(dz)
     else:
-        force_change(change, place, l, -1.0, dz)
-        force_change(new, place, l, 1.0, dz)
-    p = max((y[0, l] + y[1, l] + y[2, l]) / 3.0, 1e-12)
+        force_change(rows, change, total, l, -1.0, dz, small)
+    force_change(rows, new, total, l, 1.0, dz, small)
+    p = max((rows[spot(Y, l)] + rows[spot(Y + 1, l)] + rows[spot(Y + 2, l)]) / 3.0, 1e-12)
     critical, slope = critical_void_ratio(p, line)
-    tan_p = work[FRICTION, l]
-    of_old, of_new, of_plastic = np.zeros((3, 3)), np.zeros((3, 3)), np.zeros((3, 3))
-    of_slide, after, before = np.zeros(3), np.zeros(3), np.zeros(3)
+    tan_p = rows[spot(FRICTION, l)]
+    q = small[8, 1]
     for a in range(weights.shape[0]):
         n = (normals[a, 0], normals[a, 1], normals[a, 2])
-        forces(work, base, total, a, n, l, before, after)
-        slip, q, by_tan = plane_change(
-            work, sliding[a, l], before, after, elastic, n, l, of_old, of_new, of_slide, of_plastic
-        )
+        forces(rows, base, total, a, n, l, small)
+        slip, by_tan = plane_change(rows, slide[spot(a, l)], elastic, n, l, small)
         if slip > 0.0:
             for c in range(6):
                 dp = (new[0, c] + new[1, c] + new[2, c]) / 3.0
-                dslide[a, c] = by_tan * tan_p * (slope * dp / critical - new[12, c] / y[12, l])
+                dslide[a, c] = by_tan * tan_p * (slope * dp / critical - new[VOID, c] / rows[spot(Y + VOID, l)])
                 for k in range(3):
                     for m in range(3):
                         dslide[a, c] += q[k] * dz[3 * k + m, c] * n[m]

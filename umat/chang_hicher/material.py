@@ -6,6 +6,7 @@ Grain size drops out of the dimensionless system (see `contact`): force over p_r
 
 from functools import lru_cache
 from typing import Any, Literal, NamedTuple
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -13,11 +14,10 @@ from numpy.typing import ArrayLike
 from ..directions import Directions
 from ..fabric import Constant, ZhaoKruyt
 from ..interface import checked_vectors
-from ..mandel import Array, to_tensor
-from .pool import Constants, Rule
-from .programs import moment_table
-
-GROUP = 4
+from ..mandel import DEVIATORIC, SPHERICAL, Array, deviator, dot, norm, principal, to_tensor
+from ..mandel import p as mean
+from .planes import Rule, padded
+from .pool import Constants
 
 
 class ChangHicher(NamedTuple):
@@ -76,22 +76,14 @@ def constants_of(material: ChangHicher) -> Constants:
     )
 
 
-_RULES: dict[int, tuple[Directions, Rule]] = {}
+_RULES: WeakKeyDictionary[Directions, Rule] = WeakKeyDictionary()
 
 
 def rule_of(directions: Directions) -> Rule:
-    """Return the directions padded to whole groups with weightless copies of the first."""
-    known = _RULES.get(id(directions))
-    if known is not None and known[0] is directions:
-        return known[1]
-    if directions.mirror_axis not in (None, "z"):
-        raise ValueError(f"the mirror plane of the directions must be normal to z, not {directions.mirror_axis}")
-    missing = -len(directions.weights) % GROUP
-    normals = np.vstack([directions.normals, np.repeat(directions.normals[:1], missing, axis=0)])
-    weights = np.concatenate([directions.weights, np.zeros(missing)])
-    rule = Rule(np.ascontiguousarray(normals), weights, moment_table(normals))
-    _RULES[id(directions)] = (directions, rule)
-    return rule
+    """Return the directions as the kernels read them, made once."""
+    if directions not in _RULES:
+        _RULES[directions] = padded(directions)
+    return _RULES[directions]
 
 
 def contact_forces(material: ChangHicher, directions: Directions, stress: Array, fabric: Array, void_ratio: Array) -> Array:
@@ -135,7 +127,7 @@ def start(
         raise ValueError("the void ratio must lie between 0 and 1.64")
     force = contact_forces(material, directions, stress, fabric, void_ratio)
     normal, ratio = mobilised(material, directions, force)
-    critical = critical_void_ratio(material, stress[:, :3].mean(axis=1))
+    critical = critical_void_ratio(material, mean(stress))
     limit = (critical / void_ratio * constants.tan_mu)[:, None]
     if not (np.all(normal > 0.0) and np.all(ratio < limit)):
         raise ValueError("the stress lies outside the domain of the contact law: some contact would pull or slide freely")
@@ -143,3 +135,38 @@ def start(
     slip = ease_p * compliance * np.sqrt(normal) * limit * ratio / (limit - ratio)
     kept = force if not constants.total else np.zeros((n, 0, 3))
     return ChangHicherState(stress, fabric, void_ratio, np.ascontiguousarray(slip), np.ascontiguousarray(kept))
+
+
+def fields(material: ChangHicher, state: ChangHicherState) -> dict[str, Array]:
+    """Return the derived fields of a state.
+
+    void_ratio; state_parameter ψ = e − e_c; fabric (n, 6) F and fabric_norm ‖F‖; anisotropy F:n with n the direction
+    of the stress deviator; mobilised_friction, the angle of (σ1 − σ3)/(σ1 + σ3) = sin φ [deg].
+    """
+    floor = 1e-12 * material.reference_pressure
+    s = deviator(state.stress)
+    major, _, minor = np.moveaxis(principal(state.stress), -1, 0)
+    return {
+        "void_ratio": state.void_ratio,
+        "state_parameter": state.void_ratio - critical_void_ratio(material, mean(state.stress)),
+        "fabric": state.fabric,
+        "fabric_norm": norm(state.fabric),
+        "anisotropy": dot(state.fabric, s) / np.maximum(norm(s), floor),
+        "mobilised_friction": np.degrees(np.arcsin(np.clip((major - minor) / np.maximum(major + minor, floor), 0.0, 1.0))),
+    }
+
+
+def elastic(material: ChangHicher, state: ChangHicherState) -> Array:
+    """Return the (n, 6, 6) elastic tangent of an isotropic packing at the state's pressure and void ratio.
+
+    With F = 0, f = (3/c) σ n and ⟨n_i n_j n_k n_l⟩ = (δ_ij δ_kl + δ_ik δ_jl + δ_il δ_jk)/15 the averages of [ZK Table 3] close:
+    ε = (9/c) [(C_n − C_t) (tr σ I + 2σ)/15 + C_t σ/3], C_n = compliance / (2 √f_n), C_t = C_n / k_tR.
+    """
+    constants = constants_of(material)
+    compliance, ease_t, _, _ = constants.elastic
+    p = np.maximum(mean(state.stress), 1e-3 * material.reference_pressure) / material.reference_pressure
+    density = 3.0 / (2.0 * np.pi) * (13.28 - 8.0 * state.void_ratio) / (1.0 + state.void_ratio)
+    normal = 0.5 * compliance / np.sqrt(3.0 * p / density) * 9.0 / density
+    bulk = 1.0 / normal  # strain/3 of each axis is normal p / 3
+    shear = 1.0 / (normal * (2.0 / 15.0 + ease_t / 5.0))
+    return (bulk[:, None, None] * 3.0 * SPHERICAL + shear[:, None, None] * DEVIATORIC) * material.reference_pressure

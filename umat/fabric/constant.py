@@ -9,7 +9,7 @@ class Constant(NamedTuple):
     """No parameters."""
 
 
-@law(Constant)
+@law(Constant, "fabric")
 def increment(law, fabric, stress, state_parameter, ratio, strain, plastic):
     """Return zero."""
     return (0.0 * fabric[0], 0.0 * fabric[1], 0.0 * fabric[2], 0.0 * fabric[3], 0.0 * fabric[4], 0.0 * fabric[5])

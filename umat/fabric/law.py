@@ -95,7 +95,7 @@ if COMPILED:
         return entry.slope.py_func
 
 
-@njit(inline="always")
+@kernel
 def six(rows, first, l):
     """Return six rows as a tuple."""
     return (

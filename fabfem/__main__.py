@@ -1,0 +1,5 @@
+"""``python -m fabfem`` is the ``fabfem`` command."""
+
+from fabfem.cli import main
+
+raise SystemExit(main())

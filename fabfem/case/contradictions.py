@@ -1,0 +1,79 @@
+"""What is wrong in a case that no single table can see."""
+
+from collections import Counter
+from collections.abc import Iterator
+
+from fabfem.case.materials import ChangHicher
+from fabfem.case.schema import Case
+from fabfem.case.stages import COMPONENTS, Geostatic, Load, Vector
+from fabfem.case.table import suggest
+
+
+def contradictions(case: Case) -> Iterator[tuple[str, str]]:
+    """Yield (place, what) for what no single table can see."""
+    yield from _unknown_components(case)
+    yield from _repeated_names(case)
+    yield from _impossible_together(case)
+    yield from _odd_columns(case)
+
+
+def _odd_columns(case: Case) -> Iterator[tuple[str, str]]:
+    columns = _recorded(case)
+    for derived in case.derived:
+        where = f"derived[{derived.name}]"
+        if derived.of not in columns:
+            yield f"{where}.of", f"there is no probe or reaction '{derived.of}'{suggest(derived.of, columns)}"
+        if 0.0 in derived.divide_by:
+            yield f"{where}.divide_by", "must not be zero"
+    for probe in case.probe:
+        if (probe.boundary is None) == (probe.point is None):
+            yield f"probe[{probe.name}]", "needs either a boundary or a point"
+
+
+def _impossible_together(case: Case) -> Iterator[tuple[str, str]]:
+    for stage in case.stage[1:]:
+        if isinstance(stage, Geostatic):
+            yield f"stage[{stage.name}].kind", "a geostatic stage must be the first"
+    for name, material in case.material.items():
+        if len(case.material) > 1 and material.zones is None:
+            yield f"material.{name}.zones", "is missing; with several materials each names its zones"
+        fabric = material.fabric if isinstance(material, ChangHicher) else None
+        if fabric and fabric.bedding_angle and case.scene.kinematics.startswith("axisymmetric"):
+            yield f"material.{name}.fabric.bedding_angle", "must be 0: inclined bedding has no axis of symmetry"
+
+
+def _unknown_components(case: Case) -> Iterator[tuple[str, str]]:
+    valid = COMPONENTS[case.scene.kinematics]
+    for where, component in _components(case):
+        if component not in valid:
+            yield where, f"'{component}' is no component of {case.scene.kinematics}; it has {', '.join(valid)}"
+
+
+def _components(case: Case) -> Iterator[tuple[str, str]]:
+    for number, support in enumerate(case.support, 1):
+        yield from ((f"support[{number}].fix", component) for component in support.fix)
+    yield from ((f"probe[{probe.name}].component", probe.component) for probe in case.probe)
+    yield from ((f"reaction[{entry.name}].component", entry.component) for entry in case.reaction)
+    for stage in case.stage:
+        vectors: dict[str, tuple[Vector, ...]] = {"traction": stage.traction}
+        if isinstance(stage, Load):
+            vectors["displacement"] = stage.displacement
+        for kind, entries in vectors.items():
+            for number, vector in enumerate(entries, 1):
+                yield from ((f"stage[{stage.name}].{kind}[{number}]", name) for name in vector.components())
+
+
+def _repeated_names(case: Case) -> Iterator[tuple[str, str]]:
+    lists = {
+        "stage": [stage.name for stage in case.stage],
+        "probe, reaction or derived": [*_recorded(case), *(derived.name for derived in case.derived)],
+    }
+    for kind, names in lists.items():
+        for name, count in Counter(names).items():
+            if count > 1:
+                yield kind, f"the name '{name}' is given {count} times"
+
+
+def _recorded(case: Case) -> list[str]:
+    """Return the names of all probes and reactions."""
+    return [*(probe.name for probe in case.probe), *(entry.name for entry in case.reaction)]

@@ -1,0 +1,138 @@
+"""What a case may say about its materials, one table ``[material.NAME]`` each, told apart by ``model``."""
+
+from typing import Annotated, Literal
+
+from pydantic import Field, field_validator
+
+from fabfem.case.table import Angle, Names, NotNegative, Positive, Table, Text
+
+SOLID_FRACTION_LIMIT = 13.28 / 8.0
+"""Void ratio at which the number of contacts per particle, 13.28 - 8 e, vanishes [ZK table 3]."""
+
+LARGEST_FABRIC = 6.0**0.5
+"""Norm at which the density of contacts 1 + F:nn of a deposit falls to zero across the deposition axis."""
+
+
+class Material(Table):
+    """What every material has."""
+
+    model: str
+    """Which material it is."""
+    zones: Names | None = None
+    """Zones of the mesh made of this material; all zones when left out."""
+    unit_weight: NotNegative = 0.0
+    """Unit weight that gravity acts on (buoyant below a water table)."""
+
+
+class Elastic(Material):
+    """Linear isotropic elasticity."""
+
+    model: Literal["elastic"]
+    youngs_modulus: Positive
+    """Young's modulus [stress]."""
+    poisson_ratio: Annotated[float, Field(gt=-1, lt=0.5)] = 0.3
+    """Poisson's ratio."""
+
+
+class VonMises(Material):
+    """Plasticity of a strength that does not depend on the mean stress."""
+
+    model: Literal["von_mises"]
+    youngs_modulus: Positive
+    """Young's modulus [stress]."""
+    poisson_ratio: Annotated[float, Field(gt=-1, lt=0.5)] = 0.3
+    """Poisson's ratio."""
+    yield_stress: Positive
+    """Yield stress in uniaxial loading, which is the square root of 3 times the shear strength [stress]."""
+    hardening_modulus: NotNegative = 0.0
+    """Slope of the yield stress against plastic strain [stress]."""
+
+
+class MohrCoulomb(Material):
+    """Mohr-Coulomb strength with its own dilation angle."""
+
+    model: Literal["mohr_coulomb"]
+    youngs_modulus: Positive
+    """Young's modulus [stress]."""
+    poisson_ratio: Annotated[float, Field(gt=-1, lt=0.5)] = 0.3
+    """Poisson's ratio."""
+    cohesion: NotNegative = 0.0
+    """Cohesion [stress]."""
+    friction_angle: Annotated[float, Field(ge=0, lt=90)]
+    """Friction angle [degree]."""
+    dilation_angle: Annotated[float, Field(ge=0, lt=90)] = 0.0
+    """Dilation angle [degree]."""
+
+
+class DruckerPrager(Material):
+    """A cone in the space of principal stresses, with linear hardening."""
+
+    model: Literal["drucker_prager"]
+    youngs_modulus: Positive
+    """Young's modulus [stress]."""
+    poisson_ratio: Annotated[float, Field(gt=-1, lt=0.5)] = 0.3
+    """Poisson's ratio."""
+    friction_slope: NotNegative
+    """Slope of the yield surface in the p-q plane."""
+    dilation_slope: NotNegative = 0.0
+    """Slope of the plastic potential in the p-q plane."""
+    strength: NotNegative = 0.0
+    """Deviatoric stress at yield without mean stress [stress]."""
+    hardening_modulus: NotNegative = 0.0
+    """Slope of that strength against plastic shear strain [stress]."""
+
+
+class Fabric(Table):
+    """The fabric of a Chang-Hicher material; without this table it is isotropic and stays so."""
+
+    law: Text = "zhao_kruyt"
+    """Evolution law, by author; ``constant`` freezes the fabric."""
+    norm: Annotated[float, Field(ge=0)] = 0.0
+    """Size of the initial fabric anisotropy tensor (F), large along the deposition axis."""
+    bedding_angle: Angle = 0.0
+    """Angle between the bedding planes and the horizontal [degree]."""
+    azimuth: Angle = 0.0
+    """Horizontal direction in which the bedding dips, from the x axis [degree]."""
+    parameters: dict[str, float] = Field(default={})
+    """Parameters of the law that differ from the preset's."""
+
+    @field_validator("norm")
+    @classmethod
+    def _keep_density_positive(cls, norm: float) -> float:
+        if norm > LARGEST_FABRIC:
+            raise ValueError(
+                f"must be at most {LARGEST_FABRIC:.4g}, beyond which the density of contacts E(n) = 1 + F:nn "
+                f"is negative in some direction (got {norm:g})"
+            )
+        return norm
+
+
+class ChangHicher(Material):
+    """The fabric-enhanced micromechanical model of granular soil."""
+
+    model: Literal["chang_hicher"]
+    preset: Text
+    """Calibrated sand that the parameters come from."""
+    void_ratio: Annotated[float, Field(gt=0)]
+    """Initial void ratio (e)."""
+    directions: Text = "bazant_oh_37"
+    """Rule of contact directions."""
+    localisation: Literal["total", "rate"] = "total"
+    """How contact forces follow the stress: from its total, or accumulated from its rate."""
+    parameters: dict[str, float] = Field(default={})
+    """Parameters that differ from the preset's."""
+    fabric: Fabric | None = None
+    """Initial fabric and its evolution law."""
+
+    @field_validator("void_ratio")
+    @classmethod
+    def _keep_contacts(cls, void_ratio: float) -> float:
+        if void_ratio >= SOLID_FRACTION_LIMIT:
+            raise ValueError(
+                f"must be less than {SOLID_FRACTION_LIMIT:g}, where the contact density 13.28 - 8 e vanishes "
+                f"(got {void_ratio:g})"
+            )
+        return void_ratio
+
+
+AnyMaterial = Annotated[Elastic | VonMises | MohrCoulomb | DruckerPrager | ChangHicher, Field(discriminator="model")]

@@ -1,0 +1,150 @@
+"""What a boundary-value case may say."""
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+from pydantic import Field, PrivateAttr
+
+from fabfem.case.materials import AnyMaterial
+from fabfem.case.stages import AnyStage, Component, Support
+from fabfem.case.table import Factors, Identifier, Names, Positive, Table, Text
+from fabfem.units import FORCES, LENGTHS, Units
+
+
+class Scene(Table):
+    """What is solved."""
+
+    kind: Literal["boundary_value"]
+    """Kind of scene."""
+    kinematics: Literal["plane_strain", "axisymmetric", "axisymmetric_torsion", "solid"]
+    """Displacements that the scene has, and the strains they make."""
+
+
+class UnitNames(Table):
+    """Units of every number in the case and in its results."""
+
+    length: Literal[*LENGTHS] = "m"  # type: ignore[valid-type]
+    """Unit of length."""
+    force: Literal[*FORCES] = "kN"  # type: ignore[valid-type]
+    """Unit of force."""
+
+
+class Mesh(Table):
+    """The mesh."""
+
+    file: Text
+    """File in any format of meshio, with named boundaries and zones; relative to the case file."""
+    order: Annotated[int, Field(ge=1, le=2)] = 2
+    """Order of the displacement in an element."""
+
+
+class Solver(Table):
+    """Solution of the equilibrium equations."""
+
+    tolerance: Positive = 1e-6
+    """Largest out-of-balance force over the size of the forces in play."""
+    iterations: Annotated[int, Field(ge=1)] = 16
+    """Most iterations of an increment before it is cut."""
+    linear: Literal["auto", "superlu", "pardiso"] = "auto"
+    """Linear solver; auto takes PARDISO where it is installed."""
+    threads: Annotated[int, Field(ge=0)] = 0
+    """Threads for the material points; 0 takes the cores there are."""
+
+
+class Probe(Table):
+    """A displacement written to the history."""
+
+    name: Identifier
+    """Name of the column."""
+    kind: Literal["displacement"] = "displacement"
+    """What is probed."""
+    boundary: Names | None = None
+    """Boundaries over whose nodes the mean is taken."""
+    point: Annotated[tuple[float, ...], Field(min_length=2, max_length=3, strict=False)] | None = None
+    """Point whose nearest node is taken, instead of a boundary."""
+    component: Component
+    """Component of the displacement."""
+    scale: float = 1.0
+    """Factor on the value."""
+
+
+class Reaction(Table):
+    """The force that a held boundary exerts on the soil, written to the history."""
+
+    name: Identifier
+    """Name of the column."""
+    boundary: Names
+    """Boundaries over which the force is summed."""
+    component: Component
+    """Component of the force."""
+    scale: float = 1.0
+    """Factor on the value, such as 2 for the other half of a symmetric scene."""
+
+
+class Derived(Table):
+    """A column of the history made from another one."""
+
+    name: Text
+    """Name of the column."""
+    of: Identifier
+    """Probe or reaction it is made from."""
+    divide_by: Factors
+    """Number, or numbers, to divide by."""
+    unit: Text = "-"
+    """Unit of the result."""
+
+
+class Output(Table):
+    """What is stored besides the history."""
+
+    fields: Annotated[tuple[Identifier, ...], Field(min_length=1, strict=False)]
+    """Fields to compute and store."""
+    every: Annotated[int, Field(ge=1)] = 1
+    """Store every so many increments; the end of a stage is always stored."""
+    at: Annotated[tuple[Literal["nodes", "cells"], ...], Field(min_length=1, strict=False)] = ("nodes", "cells")
+    """Smoothed at nodes, raw means in cells, or both."""
+
+
+class Case(Table):
+    """A boundary-value problem as its file states it."""
+
+    title: str = ""
+    """What the case is, in a line."""
+    scene: Scene
+    """What is solved."""
+    units: UnitNames = UnitNames()
+    """Units of the case."""
+    mesh: Mesh
+    """The mesh."""
+    material: Annotated[dict[Identifier, AnyMaterial], Field(min_length=1)]
+    """Materials by name."""
+    support: Annotated[tuple[Support, ...], Field(strict=False)] = ()
+    """Supports of all stages."""
+    stage: Annotated[tuple[AnyStage, ...], Field(min_length=1, strict=False)]
+    """Stages, in order."""
+    solver: Solver = Solver()
+    """Solution of the equations."""
+    probe: Annotated[tuple[Probe, ...], Field(strict=False)] = ()
+    """Displacements to record."""
+    reaction: Annotated[tuple[Reaction, ...], Field(strict=False)] = ()
+    """Forces to record."""
+    derived: Annotated[tuple[Derived, ...], Field(strict=False)] = ()
+    """Columns made from others."""
+    output: Output | None = None
+    """Fields to store; none when left out."""
+
+    _path: Path = PrivateAttr(Path("case.toml"))
+
+    @property
+    def path(self) -> Path:
+        """File that the case was read from."""
+        return self._path
+
+    @property
+    def unit_system(self) -> Units:
+        """Units of the case."""
+        return Units(self.units.length, self.units.force)
+
+    def locate(self, file: str) -> Path:
+        """Return the path of a file that the case names, which is relative to the case file."""
+        return self._path.parent / file

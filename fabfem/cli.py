@@ -1,0 +1,109 @@
+"""The ``fabfem`` command.
+
+Exit status: 0 done, 1 the pictures could not be drawn, 2 bad input, 3 a run that could not go on (all that converged
+is kept), 130 interrupted. Nothing heavy is imported before a command needs it.
+"""
+
+import argparse
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from fabfem import __version__
+
+DONE, NO_PICTURE, BAD_INPUT, STOPPED, INTERRUPTED = 0, 1, 2, 3, 130
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command line and return its exit status.
+
+    Parameters
+    ----------
+    arguments : sequence of str, optional
+        Words after the command; those of the process by default.
+    """
+    options = _parser().parse_args(arguments)
+    try:
+        return options.command(options)
+    except KeyboardInterrupt:
+        return _fail("interrupted before the first increment", INTERRUPTED)
+    except Exception as error:
+        if options.debug:
+            raise
+        return _explained(error)
+
+
+def _explained(error: Exception) -> int:
+    """Print an error as one sentence and return its exit status."""
+    from fabfem.case import CaseError
+
+    if isinstance(error, CaseError):
+        return _fail(str(error), BAD_INPUT)
+    if isinstance(error, OSError):
+        return _fail(f"{error.filename or 'a file'}: {error.strerror or error}", BAD_INPUT)
+    return _fail(f"this is a fault of the program ({type(error).__name__}: {error}); --debug shows where", STOPPED)
+
+
+def _fail(message: str, status: int) -> int:
+    print(f"fabfem: {message}", file=sys.stderr)
+    return status
+
+
+def _solve(options: argparse.Namespace) -> int:
+    from fabfem.run import run_case
+
+    outcome = run_case(options.case, options.out or Path("results") / options.case.stem, quiet=options.quiet)
+    if not options.quiet:
+        print(outcome.summary())
+    if outcome.status == "completed":
+        return DONE
+    return _fail(outcome.reason, INTERRUPTED if outcome.status == "interrupted" else STOPPED)
+
+
+def _check(options: argparse.Namespace) -> int:
+    from fabfem.case import read_case, resolved
+    from fabfem.omitted import remaining
+    from fabfem.output.progress import summary
+    from fabfem.problem import build
+
+    case = read_case(options.case)
+    problem = build(case)
+    if not options.quiet:
+        print(resolved(case))
+        print("# What the scene leaves out:", *problem.omitted, sep="\n#   ")
+        print("# What remains:\n" + summary(list(remaining(problem.model)), prefix="#   "))
+    return DONE
+
+
+def _show(options: argparse.Namespace) -> int:
+    from fabfem.show import show
+
+    shown = show(options.folder)
+    if not options.quiet:
+        print("\n".join(str(picture) for picture in shown.pictures))
+    return _fail(shown.trouble, NO_PICTURE) if shown.trouble else DONE
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="fabfem", description="Boundary-value problems in granular soil with an evolving fabric."
+    )
+    parser.add_argument("--version", action="version", version=f"fabfem {__version__}")
+    common = argparse.ArgumentParser(add_help=False)
+    common.add_argument("--quiet", action="store_true", help="print nothing but errors")
+    common.add_argument("--debug", action="store_true", help="show the traceback of an error")
+    commands = parser.add_subparsers(title="commands", required=True, metavar="COMMAND")
+
+    solve = commands.add_parser("solve", parents=[common], help="run a case and write its results")
+    solve.add_argument("case", type=Path, metavar="CASE.toml")
+    solve.add_argument("--out", type=Path, metavar="DIR", help="folder of the results (default: results/CASE)")
+    solve.set_defaults(command=_solve)
+
+    check = commands.add_parser("check", parents=[common], help="validate a case and say what its scene leaves out")
+    check.add_argument("case", type=Path, metavar="CASE.toml")
+    check.set_defaults(command=_check)
+
+    show = commands.add_parser("show", parents=[common], help="draw pictures of a result")
+    show.add_argument("folder", type=Path, metavar="DIR")
+    show.set_defaults(command=_show)
+    return parser

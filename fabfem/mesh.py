@@ -1,0 +1,240 @@
+"""Meshes with named zones and boundaries, read by meshio from any format that carries names.
+
+A zone is a set of elements, a boundary a set of facets. gmsh's physical groups and Abaqus's element sets give both;
+a node set (Abaqus) gives the outer facets whose nodes all belong to it.
+"""
+
+from collections.abc import Iterable
+from contextlib import redirect_stderr, redirect_stdout
+from dataclasses import dataclass, replace
+from difflib import get_close_matches
+from io import StringIO
+from pathlib import Path
+
+import meshio
+import numpy as np
+from meshio.abaqus._abaqus import abaqus_to_meshio_type
+
+from fabfem.elements import ELEMENTS, ElementType, quadrature, shape
+
+
+class MeshError(ValueError):
+    """A mesh that cannot be used, said in one sentence."""
+
+
+@dataclass(frozen=True)
+class Mesh:
+    """Elements of one kind with named parts.
+
+    Attributes
+    ----------
+    points : (nnodes, dim) array
+        Node coordinates.
+    cells : (nel, nnode) int array
+        Nodes of each element in meshio's order.
+    cell_type : str
+        meshio's name of the element, a key of ``ELEMENTS``.
+    zones : dict
+        Name -> element numbers.
+    boundaries : dict
+        Name -> (nfacet, nfacetnode) nodes, turned so that the right-hand normal points out of the element.
+    """
+
+    points: np.ndarray
+    cells: np.ndarray
+    cell_type: str
+    zones: dict[str, np.ndarray]
+    boundaries: dict[str, np.ndarray]
+
+    @property
+    def dim(self) -> int:
+        """Dimension of the space and of the elements."""
+        return self.points.shape[1]
+
+    @property
+    def element(self) -> ElementType:
+        """The element's row in the table."""
+        return ELEMENTS[self.cell_type]
+
+    def zone(self, name: str) -> np.ndarray:
+        """Element numbers of a zone; raises MeshError with the names that exist."""
+        return _named(self.zones, name, "zone")
+
+    def boundary(self, name: str) -> np.ndarray:
+        """(nfacet, nfacetnode) nodes of a boundary; raises MeshError with the names that exist."""
+        return _named(self.boundaries, name, "boundary")
+
+
+def read_mesh(path: str | Path, order: int | None = None) -> Mesh:
+    """The mesh in a file; order=2 turns linear elements into quadratic ones.
+
+    Raises MeshError where the file is missing or unreadable, mixes elements, or has inverted ones.
+    """
+    mesh = from_meshio(_read(Path(path)))
+    return quadratic(mesh) if order == 2 and mesh.element.quadratic else mesh
+
+
+def from_meshio(raw: meshio.Mesh) -> Mesh:
+    """The mesh in a meshio record."""
+    cell_type = _cell_type([block.type for block in raw.cells])
+    element = ELEMENTS[cell_type]
+    cells = np.vstack([block.data for block in raw.cells if block.type == cell_type])
+    facets = _facets(cells, element)
+    zones: dict[str, np.ndarray] = {}
+    boundaries: dict[str, np.ndarray] = {}
+    for name, blocks in raw.cell_sets.items():
+        if not name.startswith("gmsh:"):
+            _add(zones, name, _elements_in(raw, blocks, cell_type))
+            _add(boundaries, name, _matching(facets, _facets_in(raw, blocks, element.facet_type), element))
+    for name, nodes in raw.point_sets.items():
+        _add(boundaries, name, outer_facets(cells, cell_type, nodes))
+    zones = zones or {"all": np.arange(len(cells))}
+    return checked(_compact(_flat(raw.points, element.dim), cells, cell_type, zones, boundaries))
+
+
+def checked(mesh: Mesh) -> Mesh:
+    """The same mesh; raises MeshError where elements are inverted or have no volume."""
+    where, _ = quadrature(mesh.element)
+    _, gradients = shape(mesh.element, where)
+    jacobian = np.einsum("eai,qaj->eqij", mesh.points[mesh.cells], gradients)
+    size = np.ptp(mesh.points[mesh.cells], axis=1).max(axis=1)
+    bad = np.flatnonzero(np.linalg.det(jacobian).min(axis=1) <= 1e-10 * size**mesh.dim)
+    if len(bad):
+        some = ", ".join(map(str, bad[:8])) + (" …" if len(bad) > 8 else "")
+        raise MeshError(f"{len(bad)} of {len(mesh.cells)} elements are inverted or have no volume: {some}.")
+    return mesh
+
+
+def quadratic(mesh: Mesh, cell_type: str = "") -> Mesh:
+    """The same linear mesh with further nodes, those of `cell_type` or of the element's usual quadratic one."""
+    new = ELEMENTS[cell_type or mesh.element.quadratic]
+    points, cells = mesh.points, mesh.cells
+    for width in sorted({len(m) for m in new.midside}):
+        parents = mesh.cells[:, np.array([m for m in new.midside if len(m) == width])]
+        unique, number = np.unique(np.sort(parents.reshape(-1, width), axis=1), axis=0, return_inverse=True)
+        cells = np.hstack([cells, len(points) + number.reshape(len(cells), -1)])
+        points = np.vstack([points, mesh.points[unique].mean(axis=1)])
+    facets = _facets(cells, new)
+    boundaries = {name: _matching(facets, b, new) for name, b in mesh.boundaries.items()}
+    return replace(mesh, points=points, cells=cells, cell_type=new.name, boundaries=boundaries)
+
+
+def outer_facets(cells: np.ndarray, cell_type: str, nodes: np.ndarray) -> np.ndarray:
+    """(n, nfacetnode) facets of one element only whose nodes are all in `nodes`."""
+    element = ELEMENTS[cell_type]
+    facets = _facets(cells, element)
+    inside = facets[np.isin(facets, nodes).all(axis=1)]
+    corners = np.sort(inside[:, : _ncorner(element)], axis=1)
+    _, key, count = np.unique(corners, axis=0, return_inverse=True, return_counts=True)
+    return inside[count[key] == 1]
+
+
+def _read(path: Path) -> meshio.Mesh:
+    """What meshio reads; its prints and its exit become one sentence."""
+    if not path.is_file():
+        raise MeshError(f"there is no mesh file {path}.")
+    for name, cell_type in _ABAQUS.items():
+        abaqus_to_meshio_type.setdefault(name, cell_type)
+    said = StringIO()
+    try:
+        with redirect_stdout(said), redirect_stderr(said):
+            return meshio.read(path)
+    except (meshio.ReadError, LookupError, SystemExit, TypeError, ValueError) as error:
+        reason = said.getvalue().partition("\n")[0] or str(error) or "unknown format"
+        raise MeshError(f"{path.name} cannot be read as a mesh: {reason.rstrip('.')}.") from error
+
+
+_ABAQUS = {
+    kind + nodes + reduced: cell_type
+    for kind in ("CPE", "CPS", "CAX")
+    for nodes, cell_type in (("3", "triangle"), ("4", "quad"), ("6", "triangle6"), ("8", "quad8"))
+    for reduced in ("", "R")
+}
+"""Abaqus's plane and axisymmetric elements, of which meshio knows three."""
+
+
+def _cell_type(types: Iterable[str]) -> str:
+    known = {t for t in types if t in ELEMENTS}
+    top = max((ELEMENTS[t].dim for t in known), default=0)
+    found = sorted(t for t in known if ELEMENTS[t].dim == top)
+    unknown = sorted(set(types) - known - {"vertex"})
+    if top < 2 or unknown:
+        have = ", ".join(sorted(set(types))) or "none"
+        raise MeshError(
+            f"the mesh has elements {have}; usable are {', '.join(e for e in ELEMENTS if ELEMENTS[e].dim > 1)}."
+        )
+    if len(found) > 1:
+        raise MeshError(f"the mesh mixes {' and '.join(found)}; a mesh has one kind of element.")
+    return found[0]
+
+
+def _named(table: dict[str, np.ndarray], name: str, kind: str) -> np.ndarray:
+    if name in table:
+        return table[name]
+    near = get_close_matches(name, table, n=1)
+    hint = f", did you mean '{near[0]}'" if near else ""
+    raise MeshError(f"the mesh has no {kind} '{name}'{hint}; it has {', '.join(sorted(table)) or 'none'}.")
+
+
+def _add(table: dict[str, np.ndarray], name: str, items: np.ndarray) -> None:
+    if len(items):
+        table[name] = items
+
+
+def _elements_in(raw: meshio.Mesh, blocks: list, cell_type: str) -> np.ndarray:
+    """Numbers, among all elements of `cell_type`, of those in a set."""
+    first, found = 0, []
+    for block, chosen in zip(raw.cells, blocks, strict=True):
+        if block.type == cell_type:
+            if chosen is not None:
+                found.append(first + np.asarray(chosen, int))
+            first += len(block.data)
+    return np.unique(np.concatenate(found)) if found else np.zeros(0, int)
+
+
+def _facets_in(raw: meshio.Mesh, blocks: list, facet_type: str) -> np.ndarray:
+    """(n, nfacetnode) nodes of the facets in a set."""
+    width = len(ELEMENTS[facet_type].nodes)
+    chosen = [
+        block.data[np.asarray(ids, int)]
+        for block, ids in zip(raw.cells, blocks, strict=True)
+        if ids is not None and block.type == facet_type
+    ]
+    return np.vstack([np.zeros((0, width), int), *chosen])
+
+
+def _facets(cells: np.ndarray, element: ElementType) -> np.ndarray:
+    """(nel * nfacets, nfacetnode) nodes of every element's facets."""
+    return cells[:, np.array(element.facets)].reshape(-1, len(element.facets[0]))
+
+
+def _ncorner(element: ElementType) -> int:
+    return len(ELEMENTS[element.facet_type].corners)
+
+
+def _matching(facets: np.ndarray, wanted: np.ndarray, element: ElementType) -> np.ndarray:
+    """The elements' own facets that have the same corners as `wanted`, each once."""
+    ncorner = _ncorner(element)
+    keys = np.vstack([np.sort(wanted[:, :ncorner], axis=1), np.sort(facets[:, :ncorner], axis=1)])
+    _, key = np.unique(keys, axis=0, return_inverse=True)
+    asked, mine = np.unique(key[: len(wanted)]), key[len(wanted) :]
+    found, first = np.unique(mine, return_index=True)
+    if not np.isin(asked, found).all():
+        raise MeshError("a boundary has facets that belong to no element; mesh and boundary do not fit together.")
+    return facets[np.sort(first[np.isin(found, asked)])]
+
+
+def _flat(points: np.ndarray, dim: int) -> np.ndarray:
+    """Coordinates in the dimension of the elements."""
+    extra = points[:, dim:]
+    if extra.size and np.ptp(extra) > 1e-9 * np.ptp(points[:, :dim]):
+        raise MeshError("a two-dimensional mesh must lie in the plane z = 0 (x horizontal or radial, y up).")
+    return np.ascontiguousarray(points[:, :dim], float)
+
+
+def _compact(points: np.ndarray, cells: np.ndarray, cell_type: str, zones: dict, boundaries: dict) -> Mesh:
+    """The mesh without nodes that belong to no element."""
+    used = np.unique(cells)
+    new = np.full(len(points), -1)
+    new[used] = np.arange(len(used))
+    return Mesh(points[used], new[cells], cell_type, zones, {name: new[b] for name, b in boundaries.items()})

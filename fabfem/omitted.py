@@ -1,0 +1,64 @@
+"""What a scene leaves out, in sentences, and what remains of it: unknowns, points and memory."""
+
+from collections.abc import Iterator, Mapping, Sequence
+
+import numpy as np
+
+from fabfem.case import Case
+from fabfem.model import Model
+from fabfem.space import Space
+from fabfem.zones import Substance
+
+PROGRAM = 250.0
+"""Memory of the interpreter with all packages and compiled kernels [MiB]."""
+
+
+def left_out(case: Case, space: Space, fields: Sequence[str], substances: Mapping[str, Substance]) -> Iterator[str]:
+    """Yield a sentence for each thing that a scene does without."""
+    nodes = len(space.mesh.points)
+    yield f"no pore pressure: the scene is dry ({nodes} unknowns fewer)"
+    missing = 3 - len(space.components)
+    if missing:
+        reason = (
+            "the scene is flat" if case.scene.kinematics == "plane_strain" else "the scene has an axis and no torsion"
+        )
+        yield f"no third displacement: {reason} ({missing * nodes} unknowns fewer)"
+    for substance in substances.values():
+        yield from substance.omitted
+    idle = sorted(set(fields) - set(case.output.fields if case.output else ()))
+    if idle:
+        yield f"not gathered, because not asked for: {', '.join(idle)}"
+
+
+def remaining(model: Model) -> Iterator[tuple[str, str]]:
+    """Yield (what, how much) of what is left to compute."""
+    space = model.space
+    yield "elements", f"{len(space.mesh.cells)} ({space.mesh.cell_type}), {len(space.mesh.points)} nodes"
+    yield "points", str(space.npoints)
+    yield "unknowns", f"{space.ndof}"
+    for name, zone in model.zones.items():
+        if zone.directions is not None:
+            yield f"directions in {name}", str(len(zone.directions))
+    yield "memory", f"about {memory(model):.0f} MiB, of which {PROGRAM:.0f} MiB for the program itself"
+
+
+def memory(model: Model) -> float:
+    """Return an estimate of the memory that a run needs [MiB]: program, points, matrix and its factors."""
+    space = model.space
+    states = sum(np.asarray(part).nbytes for zone in model.zones.values() for part in zone.state)
+    points = 3 * states + space.npoints * (3 * 36 + 8 * 6) * 8 + space.terms.nbytes
+    local = space.dofs.shape[1] ** 2 * len(space.dofs)
+    matrix = local * (8 + 4) + 2 * _entries(space) * 12
+    return PROGRAM + (points + matrix + _factors(space)) / 2**20
+
+
+def _entries(space: Space) -> float:
+    """Return about how many entries the stiffness has."""
+    return space.ndof * len(space.components) * (12.0 if space.mesh.dim == 2 else 45.0)
+
+
+def _factors(space: Space) -> float:
+    """Return about how many bytes the factors of the stiffness take, after nested dissection [George 1973]."""
+    nodes = len(space.mesh.points)
+    fill = 8.0 * nodes * np.log2(nodes + 1.0) if space.mesh.dim == 2 else 8.0 * nodes ** (4.0 / 3.0)
+    return 2.0 * fill * len(space.components) ** 2 * 12.0

@@ -1,0 +1,138 @@
+"""``fields.pvd`` and one ``.vtu`` file for each stored increment.
+
+The files are zlib-compressed XML of the VTK version 1.0 format, readable by ParaView, VTK, pyvista and meshio. They
+are written here and not by meshio, which can name no components (ParaView shows them) and keeps no field data (time,
+sign convention). Fields are stored in single precision.
+"""
+
+import base64
+import struct
+import zlib
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import NamedTuple
+from xml.sax.saxutils import quoteattr
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fabfem.output.atomic import write_atomic
+
+CELL_TYPES = {
+    "triangle": 5,
+    "quad": 9,
+    "tetra": 10,
+    "hexahedron": 12,
+    "triangle6": 22,
+    "quad8": 23,
+    "tetra10": 24,
+    "hexahedron20": 25,
+    "quad9": 28,
+    "hexahedron27": 29,
+}
+"""VTK's number of each cell type; nodes are in VTK's order already."""
+
+TENSOR = ("XX", "YY", "ZZ", "XY", "YZ", "XZ")
+"""Components of a symmetric tensor in VTK's order."""
+
+COMPONENTS = {1: (), 3: ("X", "Y", "Z"), 6: TENSOR}
+TYPES = {"f4": "Float32", "f8": "Float64", "i4": "Int32", "i8": "Int64", "u1": "UInt8"}
+
+Arrays = Mapping[str, NDArray[np.float64]]
+
+
+class Frame(NamedTuple):
+    """The fields of one stored increment."""
+
+    time: float
+    """Time of the run, or number of the increment where no time is meant."""
+    at_nodes: Arrays
+    """Fields at nodes, first axis the node."""
+    in_cells: Arrays
+    """Means in cells, first axis the cell."""
+
+
+class FieldFiles:
+    """The ``.vtu`` files of a run and the collection that lists them."""
+
+    def __init__(
+        self, folder: Path, points: NDArray[np.float64], cells: NDArray[np.integer], cell_type: str, note: str
+    ) -> None:
+        self.folder = folder
+        self.note = note.replace("--", "-")
+        self._geometry = _geometry(points, cells, cell_type)
+        self._stored: list[tuple[float, str]] = []
+        write_atomic(folder / "fields.pvd", self._collection())
+
+    def write(self, frame: Frame) -> Path:
+        """Store a frame and list it in the collection; return its file."""
+        name = f"fields_{len(self._stored):04d}.vtu"
+        write_atomic(self.folder / name, "\n".join(self._lines(frame)))
+        self._stored.append((frame.time, name))
+        write_atomic(self.folder / "fields.pvd", self._collection())
+        return self.folder / name
+
+    def _lines(self, frame: Frame) -> Iterator[str]:
+        yield '<?xml version="1.0"?>'
+        yield f"<!-- {self.note} -->"
+        yield (
+            '<VTKFile type="UnstructuredGrid" version="1.0" byte_order="LittleEndian" header_type="UInt64"'
+            ' compressor="vtkZLibDataCompressor"><UnstructuredGrid>'
+        )
+        yield "<FieldData>"
+        yield _array("TimeValue", np.array([frame.time]), tuples=True)
+        yield _array("compression_positive", np.array([1], dtype=np.int32), tuples=True)
+        yield "</FieldData>"
+        yield self._geometry
+        for place, fields in (("PointData", frame.at_nodes), ("CellData", frame.in_cells)):
+            yield f"<{place}>"
+            yield from (_array(name, np.asarray(values, dtype=np.float32)) for name, values in fields.items())
+            yield f"</{place}>"
+        yield "</Piece></UnstructuredGrid></VTKFile>\n"
+
+    def _collection(self) -> str:
+        entries = [f'<DataSet timestep="{time!r}" part="0" file="{name}"/>' for time, name in self._stored]
+        head = f'<?xml version="1.0"?>\n<!-- {self.note} -->\n<VTKFile type="Collection" version="1.0"><Collection>'
+        return "\n".join([head, *entries, "</Collection></VTKFile>\n"])
+
+
+def _geometry(points: NDArray[np.float64], cells: NDArray[np.integer], cell_type: str) -> str:
+    spatial = np.zeros((len(points), 3))
+    spatial[:, : points.shape[1]] = points
+    count, nodes = cells.shape
+    arrays = (
+        _array("connectivity", cells.astype(np.int64).ravel()),
+        _array("offsets", np.arange(1, count + 1, dtype=np.int64) * nodes),
+        _array("types", np.full(count, CELL_TYPES[cell_type], dtype=np.uint8)),
+    )
+    return "\n".join(
+        [
+            f'<Piece NumberOfPoints="{len(points)}" NumberOfCells="{count}">',
+            f"<Points>{_array('Points', spatial)}</Points>",
+            f"<Cells>{''.join(arrays)}</Cells>",
+        ]
+    )
+
+
+def _array(name: str, values: NDArray[np.generic], tuples: bool = False) -> str:
+    """Return a DataArray element with one zlib block of little-endian values."""
+    width = int(np.prod(values.shape[1:], dtype=int))
+    attributes = {
+        "type": TYPES[values.dtype.str[1:]],
+        "Name": name,
+        **({"NumberOfComponents": str(width)} if values.ndim > 1 else {}),
+        **{f"ComponentName{i}": part for i, part in enumerate(_component_names(width))},
+        **({"NumberOfTuples": str(len(values))} if tuples else {}),
+        "format": "binary",
+    }
+    raw = np.ascontiguousarray(values, dtype=values.dtype.newbyteorder("<")).tobytes()
+    packed = zlib.compress(raw, 1)
+    header = struct.pack("<4Q", 1, len(raw), len(raw), len(packed))
+    content = (base64.b64encode(header) + base64.b64encode(packed)).decode()
+    return (
+        f"<DataArray {' '.join(f'{key}={quoteattr(text)}' for key, text in attributes.items())}>{content}</DataArray>"
+    )
+
+
+def _component_names(width: int) -> Sequence[str]:
+    return COMPONENTS.get(width, ())

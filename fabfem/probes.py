@@ -1,0 +1,85 @@
+"""Columns of the history: what each increment is, and the probes, reactions and derived values of the case."""
+
+from collections.abc import Callable, Sequence
+from math import prod
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fabfem.case import Case
+from fabfem.case.schema import Derived, Probe, Reaction
+from fabfem.solve import Increment
+from fabfem.space import Space
+
+Value = str | int | float
+Measure = Callable[[Increment], float]
+
+
+class Column(NamedTuple):
+    """A column of the history."""
+
+    name: str
+    """Name, as the case gives it."""
+    unit: str
+    """Unit, ``-`` for a plain number, empty for text."""
+    kind: str
+    """``probe``, ``reaction`` or ``derived``, empty for what every history has."""
+    value: Callable[[Increment], Value]
+    """The entry of an increment's row."""
+
+    @property
+    def header(self) -> str:
+        """Name and unit as they stand in the first line of the file."""
+        return f"{self.name} [{self.unit}]" if self.unit else self.name
+
+
+def columns(case: Case, space: Space) -> tuple[Column, ...]:
+    """Return the columns of a case's history."""
+    units = case.unit_system
+    force = units.label("line_force" if case.scene.kinematics == "plane_strain" else "force")
+    measures: dict[str, Measure] = {}
+    found = list(_standing())
+    for probe in case.probe:
+        measures[probe.name] = _displacement(probe, space)
+        found.append(Column(probe.name, units.label("length"), "probe", measures[probe.name]))
+    for entry in case.reaction:
+        measures[entry.name] = _force(entry, space)
+        found.append(Column(entry.name, force, "reaction", measures[entry.name]))
+    for derived in case.derived:
+        found.append(Column(derived.name, derived.unit, "derived", _quotient(derived, measures[derived.of])))
+    return tuple(found)
+
+
+def _standing() -> tuple[Column, ...]:
+    return (
+        Column("stage", "", "", lambda increment: increment.stage),
+        Column("increment", "-", "", lambda increment: increment.number),
+        Column("time", "-", "", lambda increment: float(increment.time)),
+        Column("iterations", "-", "", lambda increment: increment.iterations),
+    )
+
+
+def _displacement(probe: Probe, space: Space) -> Measure:
+    """Return the scaled mean displacement of a boundary's nodes, or that of the node nearest to a point."""
+    if probe.boundary is not None:
+        dofs = _dofs(space, probe.boundary, probe.component)
+    else:
+        distance = np.linalg.norm(space.mesh.points - np.asarray(probe.point), axis=1)
+        dofs = distance.argmin(keepdims=True) * len(space.components) + space.component(probe.component)
+    return lambda increment: float(probe.scale * increment.displacement[dofs].mean())
+
+
+def _force(entry: Reaction, space: Space) -> Measure:
+    """Return the scaled sum of the support's forces over the nodes of the boundaries, each node once."""
+    dofs = _dofs(space, entry.boundary, entry.component)
+    return lambda increment: float(entry.scale * (increment.internal_force - increment.external_force)[dofs].sum())
+
+
+def _dofs(space: Space, boundaries: Sequence[str], component: str) -> NDArray[np.intp]:
+    return np.unique(np.concatenate([space.dofs_on(name, component) for name in boundaries]))
+
+
+def _quotient(derived: Derived, measure: Measure) -> Measure:
+    divisor = prod(derived.divide_by)
+    return lambda increment: measure(increment) / divisor

@@ -1,0 +1,194 @@
+"""The discrete space: shape terms, weights, dofs, and the strain operator with its transpose.
+
+Points are numbered element by element, dofs node by node (dof = node * ncomp + component). A space knows only its own
+mesh, so the part of a mesh that one rank owns makes a space like any other.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numba
+import numpy as np
+
+from fabfem.elements import ELEMENTS, quadrature, shape
+from fabfem.kinematics import Kinematics
+from fabfem.mesh import Mesh
+
+
+@dataclass(frozen=True)
+class Space:
+    """Displacement on a mesh, seen from nodes and from points.
+
+    Attributes
+    ----------
+    mesh : Mesh
+    kinematics : Kinematics
+    dofs : (nel, nnode*ncomp) int32 array
+    values : (nq, nnode) array
+        Shape functions at the points of the reference element.
+    terms : (nel, nq, nnode, nterm) array
+        Shape terms: derivatives along the mesh axes, then N/r where there is an axis.
+    weights : (npoints,) array
+        Volume of each point, per unit thickness in plane strain, all around the axis in axisymmetry.
+    points : (npoints, dim) array
+        Where the points are.
+    where : (nq, dim) array
+        The same on the reference element.
+    """
+
+    mesh: Mesh
+    kinematics: Kinematics
+    dofs: np.ndarray
+    values: np.ndarray
+    terms: np.ndarray
+    weights: np.ndarray
+    points: np.ndarray
+    where: np.ndarray
+
+    @property
+    def nq(self) -> int:
+        """Points per element."""
+        return len(self.values)
+
+    @property
+    def npoints(self) -> int:
+        """Points in all."""
+        return len(self.weights)
+
+    @property
+    def ndof(self) -> int:
+        """Unknowns, fixed ones included."""
+        return len(self.mesh.points) * len(self.components)
+
+    @property
+    def components(self) -> tuple[str, ...]:
+        """Names of the displacement components."""
+        return self.kinematics.components
+
+    def component(self, name: str) -> int:
+        """Number of a displacement component; raises ValueError with the names that exist."""
+        if name not in self.components:
+            raise ValueError(f"there is no displacement component '{name}'; there are {', '.join(self.components)}.")
+        return self.components.index(name)
+
+    def dofs_on(self, boundary: str, component: str) -> np.ndarray:
+        """Dofs of one component on a boundary, each once."""
+        nodes = np.unique(self.mesh.boundary(boundary))
+        return nodes * len(self.components) + self.component(component)
+
+    def points_of(self, elements: np.ndarray) -> slice | np.ndarray:
+        """The points of some elements, as a slice where they follow one another."""
+        first, last = int(elements[0]), int(elements[-1]) + 1
+        if len(elements) == last - first and (np.diff(elements) == 1).all():
+            return slice(first * self.nq, last * self.nq)
+        return (elements[:, None] * self.nq + np.arange(self.nq)).ravel()
+
+    def strain(self, displacement: np.ndarray) -> np.ndarray:
+        """(npoints, 6) Mandel strain, compression positive, of a displacement (ndof,)."""
+        strain = np.zeros((self.npoints, 6))
+        _strain(strain, displacement, self.dofs, self.terms, self.kinematics.active, *self.kinematics.sparse_operator)
+        return strain
+
+    def internal_force(self, stress: np.ndarray) -> np.ndarray:
+        """(ndof,) nodal forces in equilibrium with a stress (npoints, 6)."""
+        force = np.zeros(self.ndof)
+        operator = (self.kinematics.active, *self.kinematics.sparse_operator)
+        _force(force, stress, self.weights, self.dofs, self.terms, *operator)
+        return force
+
+    def displacement(self, u: np.ndarray) -> np.ndarray:
+        """(nnodes, 3) displacement along the three axes of the kinematics."""
+        full = np.zeros((len(self.mesh.points), 3))
+        full[:, self.kinematics.axes] = u.reshape(len(full), -1)
+        return full
+
+    def cell_mean(self, values: np.ndarray) -> np.ndarray:
+        """(nel, ...) volume means of point values (npoints, ...)."""
+        weights = self.weights.reshape(-1, self.nq)
+        grouped = values.reshape(*weights.shape, *values.shape[1:])
+        return np.einsum("eq...,eq->e...", grouped, weights / weights.sum(axis=1, keepdims=True))
+
+    def nodal(self, values: np.ndarray) -> np.ndarray:
+        """(nnodes, ...) smoothed values: a linear fit in each element, then the volume-weighted mean at each node."""
+        cells = self.mesh.cells
+        volume = self.weights.reshape(-1, self.nq).sum(axis=1)
+        fitted = np.einsum("aq,eqk->eak", self._to_nodes, values.reshape(len(cells), self.nq, -1))
+        total = np.zeros((len(self.mesh.points), fitted.shape[2]))
+        share = np.bincount(cells.ravel(), np.repeat(volume, cells.shape[1]), len(total))
+        for k in range(total.shape[1]):
+            total[:, k] = np.bincount(cells.ravel(), (fitted[:, :, k] * volume[:, None]).ravel(), len(total)) / share
+        return total.reshape(len(total), *values.shape[1:])
+
+    @cached_property
+    def _to_nodes(self) -> np.ndarray:
+        """(nnode, nq) least-squares fit of the linear element's functions to the points, evaluated at the nodes."""
+        element = self.mesh.element
+        linear = ELEMENTS[element.linear or element.name]
+        return shape(linear, element.nodes)[0] @ np.linalg.pinv(shape(linear, self.where)[0])
+
+
+def build_space(mesh: Mesh, kinematics: Kinematics, points: int | None = None) -> Space:
+    """The space of `kinematics` on `mesh` with `points` points per element, by default the element's usual number.
+
+    Raises ValueError where mesh and kinematics do not fit together.
+    """
+    if mesh.dim != kinematics.dim:
+        raise ValueError(f"this kinematics needs a mesh of dimension {kinematics.dim}, the mesh has {mesh.dim}.")
+    where, rule = quadrature(mesh.element, points)
+    values, reference = shape(mesh.element, where)
+    nodes = mesh.points[mesh.cells]
+    jacobian = np.einsum("eai,qaj->eqij", nodes, reference)
+    terms = np.einsum("qaj,eqji->eqai", reference, np.linalg.inv(jacobian))
+    weights = np.linalg.det(jacobian) * rule
+    places = np.einsum("qa,eai->eqi", values, nodes)
+    if kinematics.radial:
+        radius = _radius(places)
+        terms = np.concatenate([terms, (values / radius[:, :, None])[..., None]], axis=3)
+        weights = weights * 2.0 * np.pi * radius
+    return Space(
+        *(mesh, kinematics, _dofs(mesh.cells, len(kinematics.components)), values, np.ascontiguousarray(terms)),
+        *(weights.ravel(), places.reshape(-1, mesh.dim), where),
+    )
+
+
+def _radius(places: np.ndarray) -> np.ndarray:
+    if places[..., 0].min() <= 0.0:
+        raise ValueError("an axisymmetric mesh must lie at x > 0: x is the radius.")
+    return places[..., 0]
+
+
+def _dofs(cells: np.ndarray, ncomp: int) -> np.ndarray:
+    """(nel, nnode*ncomp) dofs of each element, node by node."""
+    return (cells[:, :, None] * ncomp + np.arange(ncomp)).reshape(len(cells), -1).astype(np.int32)
+
+
+@numba.njit(cache=True, nogil=True)
+def _strain(strain, u, dofs, terms, active, where, values):
+    nel, nq, nnode, _ = terms.shape
+    ncomp = dofs.shape[1] // nnode
+    for e in range(nel):
+        for q in range(nq):
+            for k in range(len(values)):
+                row, component, term = active[where[k, 0]], where[k, 1], where[k, 2]
+                total = 0.0
+                for a in range(nnode):
+                    total += terms[e, q, a, term] * u[dofs[e, a * ncomp + component]]
+                strain[e * nq + q, row] += values[k] * total
+
+
+@numba.njit(cache=True, nogil=True)
+def _force(force, stress, weights, dofs, terms, active, where, values):
+    nel, nq, nnode, _ = terms.shape
+    ncomp = dofs.shape[1] // nnode
+    local = np.empty(dofs.shape[1])
+    for e in range(nel):
+        local[:] = 0.0
+        for q in range(nq):
+            p = e * nq + q
+            for k in range(len(values)):
+                component, term = where[k, 1], where[k, 2]
+                flow = values[k] * weights[p] * stress[p, active[where[k, 0]]]
+                for a in range(nnode):
+                    local[a * ncomp + component] += flow * terms[e, q, a, term]
+        for i in range(len(local)):
+            force[dofs[e, i]] += local[i]

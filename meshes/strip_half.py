@@ -1,0 +1,62 @@
+"""Make strip_half.msh: half of a strip footing B = 0.9 m on level ground, 6-node triangles.
+
+The domain is 5 B wide and 5 B deep, the surface at y = 0, the footing's base 0 ≤ x ≤ 0.45 m. Elements are finest at
+the footing's edge. Needs gmsh (``pip install gmsh``): ``python meshes/strip_half.py [FILE]``.
+"""
+
+import sys
+from pathlib import Path
+
+import gmsh
+
+HALF = 0.45
+WIDTH = DEPTH = 5 * 2 * HALF
+FINE, FOOTING, COARSE = 0.02, 0.04, 0.45
+"""Element size at the footing's edge, below the footing, and far away [m]."""
+
+
+def draw() -> None:
+    """Draw the domain and name its parts."""
+    add = gmsh.model.geo
+    corners = [(0, 0), (0, -DEPTH), (WIDTH, -DEPTH), (WIDTH, 0), (HALF, 0)]
+    points = [add.addPoint(x, y, 0) for x, y in corners]
+    lines = [add.addLine(a, b) for a, b in zip(points, [*points[1:], points[0]], strict=True)]
+    ground = add.addPlaneSurface([add.addCurveLoop(lines)])
+    add.synchronize()
+    for name, line in zip(("symmetry", "bottom", "side", "surface", "footing"), lines, strict=True):
+        gmsh.model.addPhysicalGroup(1, [line], name=name)
+    gmsh.model.addPhysicalGroup(2, [ground], name="soil")
+    grade(edge=points[4], footing=lines[4])
+
+
+def grade(edge: int, footing: int) -> None:
+    """Let the element size grow with the distance from the footing and from its edge."""
+    field = gmsh.model.mesh.field
+    sizes = []
+    for what, tag, start in (("PointsList", edge, FINE), ("CurvesList", footing, FOOTING)):
+        distance = field.add("Distance")
+        field.setNumbers(distance, what, [tag])
+        field.setNumber(distance, "Sampling", 200)
+        size = field.add("MathEval")
+        field.setString(size, "F", f"Min({start} + 0.105 * F{distance}, {COARSE})")
+        sizes.append(size)
+    smallest = field.add("Min")
+    field.setNumbers(smallest, "FieldsList", sizes)
+    field.setAsBackgroundMesh(smallest)
+    for option in ("MeshSizeExtendFromBoundary", "MeshSizeFromPoints", "MeshSizeFromCurvature"):
+        gmsh.option.setNumber(f"Mesh.{option}", 0)
+
+
+def main(path: Path) -> None:
+    """Write the mesh to `path`."""
+    gmsh.initialize()
+    gmsh.option.setNumber("General.Terminal", 0)
+    draw()
+    gmsh.model.mesh.generate(2)
+    gmsh.model.mesh.setOrder(2)
+    gmsh.write(str(path))
+    gmsh.finalize()
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).with_suffix(".msh"))

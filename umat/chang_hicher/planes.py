@@ -1,0 +1,91 @@
+"""Which products of a direction's displacement and its normal are summed, and the moments of the normals.
+
+With mirror symmetry about the plane normal to z every component with an odd number of z indices vanishes; those
+sums are simply not in the list and stay zero, which is all that the symmetry needs.
+
+Storage: a pair (i, k) is row 3 i + k, a symmetric pair row `PAIR`, a symmetric triple row `TRIPLE`.
+"""
+
+from functools import lru_cache
+from itertools import product
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..directions import Directions
+from .contact import GROUP
+from .rows import (
+    BARE, BARE_SLIPPED, BY_DILATANCY, BY_FRICTION, D, D_DILATANCY, D_FRICTION, D_LATE, D_SLIPPED, DISPLACEMENT, H,
+    H_SLIPPED, LATE, SLIPPED, STIFFNESS, STIFFNESS_SLIPPED, T, T_SLIPPED, WASTE,
+)  # fmt: skip
+
+AXES = range(3)
+PAIR = [(0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1)]
+TRIPLE = [(i, j, k) for i in AXES for j in AXES for k in AXES if i <= j <= k]
+
+
+class Terms(NamedTuple):
+    """Terms (buffer row, three out rows, three moment columns), and the Mandel components that do not vanish."""
+
+    always: NDArray[np.int64]
+    evolving: NDArray[np.int64]
+    components: NDArray[np.int64]
+
+
+class Rule(NamedTuple):
+    """Contact directions, padded with weightless ones to whole groups, and the moments of their normals."""
+
+    normals: NDArray[np.float64]
+    weights: NDArray[np.float64]
+    table: NDArray[np.float64]
+
+
+@lru_cache(maxsize=2)
+def terms(mirrored: bool) -> Terms:
+    """Return the terms of a half sphere, or of a quarter mirrored about the plane z = 0."""
+
+    def kept(*index: int) -> bool:
+        return not mirrored or index.count(2) % 2 == 0
+
+    first = ((D, DISPLACEMENT), (D_SLIPPED, SLIPPED), (D_LATE, LATE), (D_FRICTION, BY_FRICTION))
+    always = [(out + 3 * i + j, row + i, j) for out, row in first for i, j in product(AXES, AXES) if kept(i, j)]
+    always += [(D_DILATANCY + s, BY_DILATANCY, 3 + s) for s, pair in enumerate(PAIR) if kept(*pair)]
+    stiffness = [(6 * (3 * i + k) + s, 3 * i + k, 3 + s)
+                 for i, k in product(AXES, AXES) for s, pair in enumerate(PAIR) if kept(i, k, *pair)]  # fmt: skip
+    density = [(10 * i + s, i, 9 + s) for i in AXES for s, triple in enumerate(TRIPLE) if kept(i, *triple)]
+    always += [(H + o, STIFFNESS + b, c) for o, b, c in stiffness]
+    evolving = [(H_SLIPPED + o, STIFFNESS_SLIPPED + b, c) for o, b, c in stiffness]
+    evolving += [(T + o, BARE + b, c) for o, b, c in density]
+    evolving += [(T_SLIPPED + o, BARE_SLIPPED + b, c) for o, b, c in density]
+    components = np.array([0, 1, 2, 5] if mirrored else range(6))
+    return Terms(_in_threes(always), _in_threes(evolving), components)
+
+
+def _in_threes(terms: list[tuple[int, int, int]]) -> NDArray[np.int64]:
+    """Return the terms (out row, buffer row, column) with up to three that share a buffer row in one; the rest go to waste."""
+    table = []
+    for row in sorted({term[1] for term in terms}):
+        of_row = [(out, column) for out, buffer, column in terms if buffer == row]
+        for k in range(0, len(of_row), 3):
+            three = of_row[k : k + 3]
+            three += [(WASTE + j, 0) for j in range(len(three), 3)]
+            table.append([row, *(out for out, _ in three), *(column for _, column in three)])
+    return np.array(table)
+
+
+def moments(normals: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return n_i, n_i n_j and n_i n_j n_k of every direction, shape (directions, 3 + 6 + 10)."""
+    columns = [normals[:, i] for i in AXES]
+    columns += [normals[:, list(index)].prod(axis=1) for index in (*PAIR, *TRIPLE)]
+    return np.ascontiguousarray(np.array(columns).T)
+
+
+def padded(directions: Directions) -> Rule:
+    """Return the directions, padded with weightless copies of the first."""
+    if directions.mirror_axis not in (None, "z"):
+        raise ValueError(f"the mirror plane of the directions must be normal to z, not {directions.mirror_axis}")
+    missing = -len(directions.weights) % GROUP
+    normals = np.vstack([directions.normals, np.repeat(directions.normals[:1], missing, axis=0)])
+    weights = np.concatenate([directions.weights, np.zeros(missing)])
+    return Rule(np.ascontiguousarray(normals), weights, moments(normals))
