@@ -19,7 +19,7 @@ USELESS = 1e-6
 
 
 def norm(vector: np.ndarray) -> float:
-    """Euclidean length; without BLAS, whose threads wait for those of PARDISO (7 ms instead of 0.1 at 81k dofs)."""
+    """Euclidean length; without BLAS, whose threads wait for those of PARDISO (5.5 ms against 0.15 at 81k dofs)."""
     return float(np.sqrt(np.square(vector).sum()))
 
 

@@ -46,8 +46,8 @@ class Controls:
     growth : float
         By how much.
     rise : float
-        How many times larger a correction may make the residual before it is halved; Newton often needs one step up,
-        and a non-associated material stops early where every step must go down.
+        How many times larger a correction may make the residual before it is halved. Newton often needs a step up;
+        `docs/architecture.md` has what was tried.
     backtracks : int
         Halvings of one correction, at most.
     extrapolate : bool

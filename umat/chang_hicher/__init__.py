@@ -40,12 +40,12 @@ def _(material: ChangHicher, directions: Directions, strain_increment: ArrayLike
     n = len(strain)
     constants, rule = constants_of(material), rule_of(directions)
     products = terms(directions.symmetry == "quarter")
-    data = (old.stress / material.reference_pressure, old.fabric, old.void_ratio, old.slip, old.force, strain)
-    stress, fabric, void_ratio, slip, force = (np.array(a) for a in data[:5])
+    data = (old.stress / material.reference_pressure, old.fabric, old.void_ratio, old.slip, old.force, old.gap, strain)
+    stress, fabric, void_ratio, slip, force, gap = (np.array(a) for a in data[:6])
     tangent = np.zeros((n, 6, 6))
     codes, errors = np.zeros(n, np.int8), np.zeros(n)
     work, substeps = np.zeros(n, np.int32), np.zeros(n, np.int32)
-    out = (stress, fabric, void_ratio, slip, force, tangent, codes, errors, work, substeps)
+    out = (stress, fabric, void_ratio, slip, force, gap, tangent, codes, errors, work, substeps)
 
     def kernel(begin: int, end: int) -> None:
         pool = _pool(len(rule.weights), constants.total)
@@ -56,7 +56,7 @@ def _(material: ChangHicher, directions: Directions, strain_increment: ArrayLike
     tangent *= material.reference_pressure
     refused = codes != status.OK
     stress[refused] = old.stress[refused]
-    state = ChangHicherState(stress, fabric, void_ratio, slip, force)
+    state = ChangHicherState(stress, fabric, void_ratio, slip, force, gap)
     return Response(stress, tangent, state, codes, errors, work)
 
 

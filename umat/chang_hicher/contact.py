@@ -4,9 +4,7 @@ Everything here is dimensionless: stress over p_ref, force over p_ref r², displ
 radius), which leaves one elastic constant, compliance = √(f_ref p_ref) / k_n0. With f_n, f_t the
 normal force and the tangential force vector, R = |f_t| / f_n, and `o` the start of the step [ZK Table 3]:
 
-* elastic displacement, exact on a straight force path:
-  δᵉ = C (Δf_n n + Δf_t / k_tR),  C = compliance / (√f_n + √f_no) · [1 + g (f_n + √(f_n f_no) + f_no) / (f_n f_no)^{3/2}]
-  with g = f_gap²: below the force f_gap a contact softens smoothly and opens, it never pulls;
+* elastic displacement, exact on a straight force path:  δᵉ = C (Δf_n n + Δf_t / k_tR),  C = compliance / (√f_n + √f_no);
 * sliding done when the force is reached:  λ = max(λ_o, λ_req),
   λ_req = compliance / (2 k_pR) √f_n · tanφ_p R / (tanφ_p − R);
 * its displacement, direction and dilatancy taken at the middle force f_m = (f + f_o)/2 (second order):
@@ -32,9 +30,9 @@ def contact_plane(rows, before, after, out, n, weight, elastic):
     """Fill one direction's buffer `out` with displacements and their derivatives, times the direction's weight.
 
     rows: the lanes, flat; before, after: rows of the sliding done before and after the step; out: `BUFFER` rows, flat
-    (arrays of their own, and constant places in them, or the compiler sees too many overlaps to check); elastic: (compliance, 1/k_tR, 1/(2 k_pR), f_gap²).
+    (arrays of their own, and constant places in them, or the compiler sees too many overlaps to check); elastic: (compliance, 1/k_tR, 1/(2 k_pR)).
     """
-    compliance, ease_t, ease_p, gap = elastic
+    compliance, ease_t, ease_p = elastic
     nx, ny, nz = n
     for l in lanes():
         # forces
@@ -71,12 +69,8 @@ def contact_plane(rows, before, after, out, n, weight, elastic):
         i_ft, i_um, i_fn, i_mid, i_room = 1.0 / ft, 1.0 / um, 1.0 / fn, 1.0 / mid, 1.0 / room
         i_s = s * i_fn
         i_sum = 1.0 / (s + so)
-        i_so = 1.0 / so
-        opening = gap * i_s * i_s * i_s * i_so * i_so * i_so
-        shape = fn + s * so + gn
-        easy = compliance * i_sum
-        c = easy * (1.0 + opening * shape)
-        dc = 0.5 * i_s * (-c * i_sum + easy * opening * (2.0 * s + so - 3.0 * shape * i_s))
+        c = compliance * i_sum
+        dc = -0.5 * i_s * c * i_sum
         dn = fn - gn
         ex = dn * nx + ease_t * (tx - hx)
         ey = dn * ny + ease_t * (ty - hy)

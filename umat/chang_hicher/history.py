@@ -98,7 +98,7 @@ def plane_change(rows, done, elastic, n, l, small):
     of_old, of_new, of_plastic = small[4], small[5], small[6]
     by_old, by_new, of_slide, q = small[7, 0], small[7, 1], small[8, 0], small[8, 1]
     t, h, u = small[9, 0], small[9, 1], small[9, 2]
-    compliance, ease_t, ease_p, gap = elastic
+    compliance, ease_t, ease_p = elastic
     fn, gn = 0.0, 0.0
     for i in range(3):
         fn += by_new[i] * n[i]
@@ -116,11 +116,8 @@ def plane_change(rows, done, elastic, n, l, small):
     room = tan_p * fn - ft
     s, so = np.sqrt(fn), np.sqrt(gn)
     mid, ratio = 0.5 * (fn + gn), ft / fn
-    opening, shape = gap / (s * so) ** 3, fn + s * so + gn
-    easy = compliance / (s + so)
-    c = easy * (1.0 + opening * shape)
-    dc = 0.5 / s * (-c / (s + so) + easy * opening * (2.0 * s + so - 3.0 * shape / s))
-    dc_old = 0.5 / so * (-c / (s + so) + easy * opening * (2.0 * so + s - 3.0 * shape / so))
+    c = compliance / (s + so)
+    dc, dc_old = -0.5 / s * c / (s + so), -0.5 / so * c / (s + so)
     required = ease_p * compliance * tan_p * s * ft / room
     slip = max(required - done, 0.0)
     on = 1.0 if required > done else 0.0

@@ -5,6 +5,7 @@ A round evaluates residual and Jacobian at the trial state of every lane at once
 * inside the domain and nearer to equilibrium: accept, take a Newton step; else halve the step (line search);
 * in equilibrium: compare with backward Euler (embedded, first order), accept the sub-step or cut it;
 * at the end of its increment: write the answer and take the next point;
+* under the open pressure: the packing has opened, the rest of the increment is a gap (see `open_point`);
 * out of means: a status code, nothing written.
 
 Sub-steps are dyadic fractions of the increment, so that the answer is a smooth function of the increment
@@ -16,14 +17,14 @@ import numpy as np
 from .. import status
 from ..fabric.law import active_inputs, increments
 from ..lanes import LANES, kernel, spot
-from .balance import FLOOR, critical_void_ratio, friction_columns, geometry, strain_and_slope
+from .balance import FLOOR, contact_density, critical_void_ratio, friction_columns, geometry, strain_and_slope
 from .contact import sum_planes
 from .elimination import factorise, solve
 from .history import advance, assign, carried, clear, density, law_carried, start_force
-from .residual import by_ratio, error_norms, fabric_rows, gather, law_inputs, norms, right_hand_sides
+from .residual import FABRIC_WEIGHT, by_ratio, error_norms, fabric_rows, gather, law_inputs, norms, right_hand_sides
 from .rows import (
-    ACCEPTED, BEST, BY_VOID_STRAIN, D, D_SLIPPED, ERROR, ERRORS, FABRIC, FABRIC_ERROR, FACTOR, FORCE, FORCE_OLD,
-    FRACTION, FULL, GAIN_END, GEO, H, H_SLIPPED, INPUTS, LAW_INPUTS, LENGTH, MARGIN, MATRIX, NEWTON, NORM, OLD, PART,
+    ACCEPTED, BEST, BY_VOID_STRAIN, CLOSING, D, D_SLIPPED, ERROR, ERRORS, DRIVE, DRIVE_START, FABRIC, FABRIC_ERROR, FACTOR, FORCE, FORCE_OLD,
+    FRACTION, FULL, GAIN_END, GEO, H, H_SLIPPED, HIGH, INPUTS, LAW_INPUTS, LENGTH, LOW, MARGIN, MATRIX, MISSING, NEWTON, NORM, OLD, PART,
     PLASTIC, PLASTIC_GEO, PLASTIC_SLOPE, PORTION, RATIO_OLD, SLOPE, STEP, STRAIN, STRESS_ERROR, STRESS_NORM, T,
     T_SLIPPED, TANGENT, VOID, VOID_START, Y,
 )  # fmt: skip
@@ -32,9 +33,12 @@ NEWTON_TOLERANCE = 1e-9  #: of the residual strain, relative to the sub-step
 NEWTON_FLOOR = 2e-15  #: of the residual strain, absolute: the rounding of the sums
 STALLED = 1e-6  #: residual relative to the sub-step that is taken when rounding stops the line search
 MAX_ITERATIONS = 30
+MAX_TRIES = 10  #: of one line search
+CONTENT = 0.5  #: part of the residual along the step that may be left, of the other sign
 SMALLEST = 2.0**-14  #: least fraction of an increment
 MAX_VOID_RATIO = 1.64  #: the contact density ∝ 13.28 − 8 e stays positive
-STRESS_FLOOR = 1e-4  #: of p_ref; below it the error of the stress is not relative
+STRESS_FLOOR = 1e-3  #: of p_ref; below it the error of the stress is not relative
+NEARLY_OPEN = 20.0  #: times the open pressure: a point that fails below it opens
 IDLE, TRIAL, ITERATE, EQUILIBRIUM, CUT = 0, 1, 2, 3, 4
 POINT, EVALUATIONS, SUBSTEPS, ITERATIONS, TRIES, CODE = 0, 1, 2, 3, 4, 5
 
@@ -54,7 +58,7 @@ def evaluate(law, constants, rule, terms, pool):
         law_inputs(rows, 0.5)
         fabric_rows(law, rows)
     gather(rows, terms.components, evolving)
-    norms(rows, terms.components.shape[0], evolving)
+    norms(rows, terms.components, evolving)
 
 
 @kernel
@@ -86,12 +90,35 @@ def toward_centre(rows, l, keep):
 
 
 @kernel
-def retry(rows, l, factor):
+def place_trial(rows, l):
     """Set the trial state to a part of the last Newton step."""
-    rows[spot(FACTOR, l)] *= factor
     for i in range(12):
         rows[spot(Y + i, l)] = rows[spot(ACCEPTED + i, l)] + rows[spot(FACTOR, l)] * rows[spot(STEP + i, l)]
-    return TRIAL
+
+
+@kernel
+def search(pool, inside, l):
+    """Return whether the line search is content; if not, the next trial is set.
+
+    Content means that along the step the residual has lost most of what drove it, without turning far the other way.
+    """
+    rows = pool.rows
+    factor, low, start, now = (
+        rows[spot(FACTOR, l)], rows[spot(LOW, l)], rows[spot(DRIVE_START, l)], rows[spot(DRIVE, l)],
+    )  # fmt: skip
+    norm, best = rows[spot(NORM, l)], rows[spot(BEST, l)]
+    if inside and (norm <= 0.5 * best or (start > 0.0 and now >= -CONTENT * start)):
+        return True
+    if inside and start <= 0.0 and norm < (1.0 - 1e-4 * factor) * best:
+        return True
+    share = 0.5
+    if inside and start > 0.0:
+        share = min(max(start / (start - now), 0.1), 0.5)
+    rows[spot(HIGH, l)] = factor
+    rows[spot(FACTOR, l)] = low + share * (factor - low)
+    pool.count[TRIES, l] += 1
+    place_trial(rows, l)
+    return False
 
 
 @kernel
@@ -109,12 +136,10 @@ def judge(pool, l):
                 return CUT
             toward_centre(rows, l, 1.0 - 0.25 * count[TRIES, l])
             return TRIAL
-    elif not inside:
-        return retry(rows, l, 0.5) if rows[spot(FACTOR, l)] > 1e-4 else CUT
-    elif norm > (1.0 - 1e-4 * rows[spot(FACTOR, l)]) * best and not rounding:
-        return retry(rows, l, 0.5) if rows[spot(FACTOR, l)] > 1e-3 else CUT
+    elif not (inside and rounding) and not search(pool, inside, l):
+        return TRIAL if count[TRIES, l] <= MAX_TRIES else CUT
     rows[spot(BEST, l)] = norm
-    rows[spot(FACTOR, l)] = 1.0
+    count[TRIES, l] = 0
     count[ITERATIONS, l] += 1
     if norm <= NEWTON_TOLERANCE * length + NEWTON_FLOOR or (rounding and norm > 0.5 * best):
         return EQUILIBRIUM
@@ -209,29 +234,36 @@ def reason(constants, rule, pool, l):
 
 @kernel
 def cut(constants, rule, pool, out, factor, l):
-    """Shorten the sub-step; True, and the point refused, when that is over."""
-    pool.rows[spot(PORTION, l)] *= factor
-    if pool.rows[spot(PORTION, l)] >= SMALLEST and pool.count[EVALUATIONS, l] < constants.max_evaluations:
+    """Shorten the sub-step; when that is over, open the point or refuse it, and return True."""
+    rows = pool.rows
+    rows[spot(PORTION, l)] *= factor
+    if rows[spot(PORTION, l)] >= SMALLEST and pool.count[EVALUATIONS, l] < constants.max_evaluations:
         begin(pool, l)
         return False
-    finish(constants, rule, pool, out, reason(constants, rule, pool, l), l)
+    p = (rows[spot(OLD, l)] + rows[spot(OLD + 1, l)] + rows[spot(OLD + 2, l)]) / 3.0
+    if p < NEARLY_OPEN * constants.open_pressure:
+        open_point(constants, rule, pool, out, l)
+    else:
+        report(pool, out, reason(constants, rule, pool, l), l)
     return True
 
 
 @kernel
-def load(constants, pool, data, point, l):
-    """Put a point into a lane; return a status code other than OK if it cannot be tried."""
-    stress, fabric, void_ratio, slip, force, strain = data
+def load(constants, rule, pool, data, out, point, l):
+    """Put a point into a lane and return True, or settle it at once: refused, or open all the time."""
+    stress, fabric, void_ratio, slip, force, gap, strain = data
     rows = pool.rows
     for k in range(6):
         pool.count[k, l] = 0
     pool.count[POINT, l] = point
-    total = void_ratio[point]
+    total, volume = void_ratio[point] + gap[point], strain[point, 0] + strain[point, 1] + strain[point, 2]
+    closing = min(gap[point] / volume, 1.0) if volume > 0.0 else (1.0 if gap[point] > 0.0 else 0.0)
     for i in range(6):
-        rows[spot(FULL + i, l)] = strain[point, i]
+        rows[spot(FULL + i, l)] = (1.0 - closing) * strain[point, i]
         rows[spot(OLD + i, l)], rows[spot(OLD + FABRIC + i, l)] = stress[point, i], fabric[point, i]
         total += strain[point, i] + stress[point, i] + fabric[point, i]
-    rows[spot(OLD + VOID, l)], rows[spot(VOID_START, l)] = void_ratio[point], void_ratio[point]
+    start = (1.0 + void_ratio[point]) * np.exp(-closing * volume) - 1.0
+    rows[spot(OLD + VOID, l)], rows[spot(VOID_START, l)], rows[spot(CLOSING, l)] = start, start, closing
     rows[spot(FRACTION, l)], rows[spot(PORTION, l)], rows[spot(ERROR, l)] = 0.0, 1.0, 0.0
     for a in range(slip.shape[1]):
         total += slip[point, a]
@@ -241,30 +273,83 @@ def load(constants, pool, data, point, l):
                 total += force[point, a, i]
                 pool.base[spot(3 * a + i, l)] = force[point, a, i]
     if not (np.isfinite(total) and stress[point, 0] + stress[point, 1] + stress[point, 2] > 0.0):
-        return status.BAD_INPUT
-    end = (1.0 + void_ratio[point]) * np.exp(-(strain[point, 0] + strain[point, 1] + strain[point, 2])) - 1.0
+        return report(pool, out, status.BAD_INPUT, l)
+    end = (1.0 + void_ratio[point]) * np.exp(-volume) - 1.0
     if not (FLOOR < end < MAX_VOID_RATIO and FLOOR < void_ratio[point] < MAX_VOID_RATIO):
-        return status.VOID_RATIO_RANGE
+        return report(pool, out, status.VOID_RATIO_RANGE, l)
     start_force(rows, constants.total, l)
+    if closing == 1.0:
+        out[2][point], out[5][point] = end, gap[point] - volume
+        elastic_open(constants, rows, out[6], point, l)
+        return report(pool, out, status.OK, l)
     begin(pool, l)
-    return status.OK
+    return True
 
 
 @kernel
-def finish(constants, rule, pool, out, code, l):
-    """Write a point's answer, or only its status."""
-    stress, fabric, void_ratio, slip, force, tangent, statuses, errors, work, substeps = out
-    rows, count = pool.rows, rule.weights.shape[0]
+def report(pool, out, code, l):
+    """Write a point's status and the work spent on it; return False."""
     point = pool.count[POINT, l]
-    statuses[point], errors[point] = code, rows[spot(ERROR, l)]
-    work[point], substeps[point] = pool.count[EVALUATIONS, l], pool.count[SUBSTEPS, l]
-    if code != status.OK:
-        return
+    out[7][point], out[8][point] = code, pool.rows[spot(ERROR, l)]
+    out[9][point], out[10][point] = pool.count[EVALUATIONS, l], pool.count[SUBSTEPS, l]
+    return False
+
+
+@kernel
+def elastic_open(constants, rows, tangent, point, l):
+    """Write the tangent of an open point: its stress is constant, so this is a stabilisation and has a name."""
+    density = contact_density(rows[spot(OLD + VOID, l)])[0]
+    compliance, ease_t, _ = constants.elastic
+    normal = 4.5 * compliance / np.sqrt(3.0 * constants.open_pressure / density) / density
+    bulk, shear = 1.0 / normal, 1.0 / (normal * (2.0 / 15.0 + ease_t / 5.0))
+    for i in range(6):
+        for j in range(6):
+            volumetric = bulk - shear / 3.0 if i < 3 and j < 3 else 0.0
+            tangent[point, i, j] = constants.open_stiffness * (volumetric + (shear if i == j else 0.0))
+
+
+@kernel
+def open_point(constants, rule, pool, out, l):
+    """Write the answer of a point that opens in this sub-step: the pressure falls to the open pressure and stays there.
+
+    Stress becomes 3 p G, under which no contact has a tangential force; fabric and sliding stay what they were when the
+    sub-step began, and the volumetric strain left is the gap.
+    """
+    stress, fabric, void_ratio, slip, force, gap, tangent = out[:7]
+    rows, point = pool.rows, pool.count[POINT, l]
+    p, volume = constants.open_pressure, rows[spot(FULL, l)] + rows[spot(FULL + 1, l)] + rows[spot(FULL + 2, l)]
+    for i in range(6):
+        fabric[point, i] = rows[spot(OLD + FABRIC + i, l)]
+        stress[point, i] = p * ((1.0 if i < 3 else 0.0) + 0.4 * fabric[point, i])
+    gap[point] = max(-(1.0 - rows[spot(FRACTION, l)]) * volume, 0.0)
+    void_ratio[point] = (1.0 + rows[spot(VOID_START, l)]) * np.exp(-volume) - 1.0
+    for a in range(slip.shape[1]):
+        slip[point, a] = pool.slide[spot(a, l)]
+        if not constants.total:
+            for i in range(3):
+                force[point, a, i] = 3.0 * p / contact_density(void_ratio[point])[0] * rule.normals[a, i]
+    elastic_open(constants, rows, tangent, point, l)
+    report(pool, out, status.OK, l)
+
+
+@kernel
+def finish(constants, rule, pool, strain, out, l):
+    """Write a point's answer."""
+    stress, fabric, void_ratio, slip, force, gap, tangent = out[:7]
+    rows, count = pool.rows, rule.weights.shape[0]
+    point, closing, new = pool.count[POINT, l], rows[spot(CLOSING, l)], pool.new_change
+    volume = strain[point, 0] + strain[point, 1] + strain[point, 2]
     for i in range(6):
         stress[point, i], fabric[point, i] = rows[spot(Y + i, l)], rows[spot(Y + FABRIC + i, l)]
+        along = 0.0
         for c in range(6):
-            tangent[point, i, c] = pool.new_change[i, c]
-    void_ratio[point] = rows[spot(Y + VOID, l)]
+            tangent[point, i, c] = (1.0 - closing) * new[i, c]
+            along += new[i, c] * strain[point, c]
+        if closing > 0.0:
+            # the contacts feel (1 − s) Δε, s = gap / Δε_v, and ds = −s dε_v / Δε_v
+            for c in range(3):
+                tangent[point, i, c] += closing / volume * along
+    void_ratio[point], gap[point] = rows[spot(Y + VOID, l)], 0.0
     for a in range(slip.shape[1]):
         slip[point, a] = pool.slide[spot(count + a, l)]
         if not constants.total:
@@ -273,6 +358,7 @@ def finish(constants, rule, pool, out, code, l):
                 for k in range(3):
                     whole += rows[spot(FORCE + 3 * i + k, l)] * rule.normals[a, k]
                 force[point, a, i] = whole
+    report(pool, out, status.OK, l)
 
 
 @kernel
@@ -280,12 +366,10 @@ def fill(constants, rule, pool, data, out, following, stop, l):
     """Give a lane the next point that can be tried; return the number of the point after it."""
     pool.count[CODE, l] = IDLE
     while following < stop:
-        code = load(constants, pool, data, following, l)
         following += 1
-        if code == status.OK:
+        if load(constants, rule, pool, data, out, following - 1, l):
             pool.count[CODE, l] = TRIAL
             break
-        finish(constants, rule, pool, out, code, l)
     return following
 
 
@@ -293,25 +377,33 @@ def fill(constants, rule, pool, data, out, following, stop, l):
 def take_step(pool, components, evolving, l):
     """Set the trial state to the Newton step just solved; False if it is not finite."""
     rows, nc = pool.rows, components.shape[0]
-    total = 0.0
+    total, drive = 0.0, 0.0
     for row in range(nc):
-        rows[spot(STEP + components[row], l)] = rows[spot(NEWTON + row, l)]
-        total += rows[spot(NEWTON + row, l)]
+        step = rows[spot(NEWTON + row, l)]
+        rows[spot(STEP + components[row], l)] = step
+        total += step
+        drive += step * rows[spot(MISSING + row, l)]
         if evolving:
-            rows[spot(STEP + FABRIC + components[row], l)] = rows[spot(NEWTON + nc + row, l)]
-            total += rows[spot(NEWTON + nc + row, l)]
-    retry(rows, l, 1.0)
+            step = rows[spot(NEWTON + nc + row, l)]
+            rows[spot(STEP + FABRIC + components[row], l)] = step
+            total += step
+            drive += FABRIC_WEIGHT * rows[spot(ACCEPTED, l)] * step * rows[spot(MISSING + nc + row, l)]
+    rows[spot(FACTOR, l)], rows[spot(LOW, l)], rows[spot(DRIVE_START, l)] = 1.0, 0.0, drive
+    place_trial(rows, l)
     return np.isfinite(total)
 
 
 @kernel
-def settle(constants, components, rule, pool, out, l):
+def settle(constants, components, rule, pool, strain, out, l):
     """Act on a lane's solved system; return True when its point is finished, one way or the other."""
     rows = pool.rows
     if pool.count[CODE, l] == ITERATE and take_step(pool, components, constants.evolving, l):
         return False
     if pool.count[CODE, l] != EQUILIBRIUM:
         return cut(constants, rule, pool, out, 0.25, l)
+    if rows[spot(Y, l)] + rows[spot(Y + 1, l)] + rows[spot(Y + 2, l)] < 3.0 * constants.open_pressure:
+        open_point(constants, rule, pool, out, l)
+        return True
     error = local_error(rows, l)
     factor = 0.5
     while factor * factor * error > 0.8 * constants.tolerance and factor > 2.0**-6:
@@ -322,7 +414,7 @@ def settle(constants, components, rule, pool, out, l):
     pool.count[SUBSTEPS, l] += 1
     collect(pool, components, constants.evolving, l)
     if rows[spot(FRACTION, l)] + rows[spot(PORTION, l)] >= 1.0:
-        finish(constants, rule, pool, out, status.OK, l)
+        finish(constants, rule, pool, strain, out, l)
         return True
     next_substep(constants, rule, pool, error, l)
     return False
@@ -373,7 +465,7 @@ def integrate(law, constants, rule, terms, pool, data, out, start, stop):
         active = 0
         for l in range(LANES):
             if count[CODE, l] > TRIAL:
-                if settle(constants, components, rule, pool, out, l):
+                if settle(constants, components, rule, pool, data[6], out, l):
                     following = fill(constants, rule, pool, data, out, following, stop, l)
                 else:
                     count[CODE, l] = TRIAL

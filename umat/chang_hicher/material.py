@@ -34,7 +34,8 @@ class ChangHicher(NamedTuple):
     reference_pressure: float  #: (p_ref) [stress]; also the unit in which the point computes
     law: Any = ZhaoKruyt()  #: record of a fabric law
     localisation: Literal["total", "rate"] = "total"
-    gap_pressure: float = 1e-4  #: contact pressure below which a contact opens, over p_ref [-]
+    open_pressure: float = 1e-4  #: mean pressure at which the packing opens, over p_ref [-]; see `opening`
+    open_stiffness: float = 0.01  #: tangent of an open point, over the elastic one at the open pressure [-]
     tolerance: float = 1e-3  #: on the local error of a sub-step: of the stress relative to its norm, of F [-]
     max_evaluations: int = 2000  #: bound on the work of one point
 
@@ -52,19 +53,21 @@ class ChangHicherState(NamedTuple):
     """(n, N) accumulated sliding over the grain diameter (δ_t^p / 2r) [-]."""
     force: Array
     """(n, N, 3) contact forces over p_ref r² in the rate form, (n, 0, 3) in the total form, which has no use for them."""
+    gap: Array
+    """(n,) volumetric strain by which an open point must be compressed before its contacts close [-], positive."""
 
 
 @lru_cache(maxsize=64)
 def constants_of(material: ChangHicher) -> Constants:
     """Return the dimensionless constants; ValueError names a parameter that cannot be."""
     for name in ("normal_stiffness", "friction_angle", "tangential_ratio", "plastic_ratio", "reference_force",
-                 "reference_pressure", "e_ref", "tolerance", "gap_pressure"):  # fmt: skip
+                 "reference_pressure", "e_ref", "tolerance", "open_pressure"):  # fmt: skip
         if not getattr(material, name) > 0.0:
             raise ValueError(f"{name} must be positive, got {getattr(material, name)}")
     if material.localisation not in ("total", "rate"):
         raise ValueError(f"localisation must be 'total' or 'rate', got {material.localisation!r}")
     compliance = (material.reference_force * material.reference_pressure) ** 0.5 / material.normal_stiffness
-    elastic = (compliance, 1.0 / material.tangential_ratio, 0.5 / material.plastic_ratio, material.gap_pressure**2)
+    elastic = (compliance, 1.0 / material.tangential_ratio, 0.5 / material.plastic_ratio)
     return Constants(
         elastic=elastic,
         line=(float(material.e_ref), float(material.critical_slope), float(material.critical_exponent)),
@@ -73,6 +76,8 @@ def constants_of(material: ChangHicher) -> Constants:
         evolving=not isinstance(material.law, Constant),
         tolerance=float(material.tolerance),
         max_evaluations=int(material.max_evaluations),
+        open_pressure=float(material.open_pressure),
+        open_stiffness=float(material.open_stiffness),
     )
 
 
@@ -131,10 +136,10 @@ def start(
     limit = (critical / void_ratio * constants.tan_mu)[:, None]
     if not (np.all(normal > 0.0) and np.all(ratio < limit)):
         raise ValueError("the stress lies outside the domain of the contact law: some contact would pull or slide freely")
-    compliance, _, ease_p, _ = constants.elastic
+    compliance, _, ease_p = constants.elastic
     slip = ease_p * compliance * np.sqrt(normal) * limit * ratio / (limit - ratio)
     kept = force if not constants.total else np.zeros((n, 0, 3))
-    return ChangHicherState(stress, fabric, void_ratio, np.ascontiguousarray(slip), np.ascontiguousarray(kept))
+    return ChangHicherState(stress, fabric, void_ratio, np.ascontiguousarray(slip), np.ascontiguousarray(kept), np.zeros(n))
 
 
 def fields(material: ChangHicher, state: ChangHicherState) -> dict[str, Array]:
@@ -163,8 +168,8 @@ def elastic(material: ChangHicher, state: ChangHicherState) -> Array:
     ε = (9/c) [(C_n − C_t) (tr σ I + 2σ)/15 + C_t σ/3], C_n = compliance / (2 √f_n), C_t = C_n / k_tR.
     """
     constants = constants_of(material)
-    compliance, ease_t, _, _ = constants.elastic
-    p = np.maximum(mean(state.stress), 1e-3 * material.reference_pressure) / material.reference_pressure
+    compliance, ease_t, _ = constants.elastic
+    p = np.maximum(mean(state.stress) / material.reference_pressure, material.open_pressure)
     density = 3.0 / (2.0 * np.pi) * (13.28 - 8.0 * state.void_ratio) / (1.0 + state.void_ratio)
     normal = 0.5 * compliance / np.sqrt(3.0 * p / density) * 9.0 / density
     bulk = 1.0 / normal  # strain/3 of each axis is normal p / 3

@@ -15,13 +15,15 @@ Array = NDArray[np.float64]
 class Constants(NamedTuple):
     """Dimensionless constants of a material and of its integration."""
 
-    elastic: tuple[float, float, float, float]  #: compliance, 1/k_tR, 1/(2 k_pR), f_gap²
+    elastic: tuple[float, float, float]  #: compliance, 1/k_tR, 1/(2 k_pR)
     line: tuple[float, float, float]  #: e_ref, λ_c, ξ
     tan_mu: float
     total: bool
     evolving: bool
     tolerance: float
     max_evaluations: int
+    open_pressure: float
+    open_stiffness: float
 
 
 class Pool(NamedTuple):

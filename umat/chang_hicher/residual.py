@@ -9,9 +9,9 @@ import numpy as np
 from ..fabric.law import active_inputs, increments, six, slope_of
 from ..lanes import LANES, at, kernel, lanes
 from .rows import (
-    BY_VOID_STRAIN, COLUMNS, ERRORS, FABRIC, FABRIC_ERROR, FABRIC_SLOPE, FIRST, GAIN, GAIN_END, GEO, INPUTS,
-    LAW_INPUTS, LAW_SLOPE, LENGTH, MATRIX, NEWTON, NORM, OLD, PART, PLASTIC, PLASTIC_SLOPE, PORTION, PSI,
-    PSI_P, RATIO_SLOPE, SLOPE, STRAIN, STRESS_ERROR, STRESS_NORM, TANGENT, VOID, Y,
+    BY_VOID_STRAIN, COLUMNS, DRIVE, ERRORS, FABRIC, FABRIC_ERROR, FABRIC_SLOPE, FIRST, GAIN, GAIN_END, GEO, INPUTS,
+    LAW_INPUTS, LAW_SLOPE, LENGTH, MATRIX, MISSING, NEWTON, NORM, OLD, PART, PLASTIC, PLASTIC_SLOPE, PORTION, PSI,
+    PSI_P, RATIO_SLOPE, SLOPE, STEP, STRAIN, STRESS_ERROR, STRESS_NORM, TANGENT, VOID, Y,
 )  # fmt: skip
 
 FABRIC_WEIGHT = 0.1  #: of the fabric residual beside the strain residual
@@ -123,16 +123,29 @@ def gather(rows, components, evolving):
 
 
 @kernel
-def norms(rows, nc, evolving):
-    """Fill the norm of the residual as a strain, and of the sub-step's strain."""
+def norms(rows, components, evolving):
+    """Fill the norm of the residual as a strain, of the sub-step's strain, and minus the residual along the step.
+
+    The latter, Σ (Δε − ε)·dσ with a share of the fabric equations, is what the line search wants small: strain grows
+    monotonically with stress, with a kink where a contact begins to slide, and the norm of the residual may have to rise
+    on the way across kinks.
+    """
+    nc = components.shape[0]
     for l in lanes():
-        rows[at(NORM, l)], rows[at(LENGTH, l)] = 0.0, 0.0
+        rows[at(NORM, l)], rows[at(LENGTH, l)], rows[at(DRIVE, l)] = 0.0, 0.0, 0.0
     for i in range(nc):
+        step = STEP + components[i]
         for l in lanes():
-            rows[at(NORM, l)] += rows[at(NEWTON + i, l)] ** 2
+            missing = rows[at(NEWTON + i, l)]
+            rows[at(MISSING + i, l)] = missing
+            rows[at(NORM, l)] += missing * missing
+            rows[at(DRIVE, l)] += missing * rows[at(step, l)]
         if evolving:
             for l in lanes():
-                rows[at(NORM, l)] += (FABRIC_WEIGHT * rows[at(NEWTON + nc + i, l)]) ** 2
+                missing = rows[at(NEWTON + nc + i, l)]
+                rows[at(MISSING + nc + i, l)] = missing
+                rows[at(NORM, l)] += (FABRIC_WEIGHT * missing) ** 2
+                rows[at(DRIVE, l)] += FABRIC_WEIGHT * rows[at(Y, l)] * missing * rows[at(step + FABRIC, l)]
     for i in range(6):
         for l in lanes():
             rows[at(LENGTH, l)] += rows[at(PART + i, l)] ** 2

@@ -58,6 +58,7 @@ _COUNTS = {
     # linear system
     "MATRIX": 144,
     "NEWTON": 12,  # minus the residual, then the Newton step
+    "MISSING": 12,  # minus the residual
     "TANGENT": 72,  # n × 6 right-hand sides, then derivatives of the unknowns by the strain increment
     "ERRORS": 12,  # first-order minus second-order residual, then the error of the unknowns
     "NORM": 1,
@@ -69,9 +70,14 @@ _COUNTS = {
     "FRACTION": 1,
     "PORTION": 1,  # done, and of this sub-step
     "FACTOR": 1,  # of the line search
+    "LOW": 1,
+    "HIGH": 1,  # its bracket
+    "DRIVE": 1,  # minus the residual along the step, now
+    "DRIVE_START": 1,  # and where the step began
     "BEST": 1,  # residual of the accepted iterate
     "ERROR": 1,
     "VOID_START": 1,
+    "CLOSING": 1,  # part of the increment that went into closing a gap
     "BY_VOID_STRAIN": 1,  # de/dε_v of the end of the sub-step
 }
 
@@ -92,11 +98,13 @@ SLOPE, PLASTIC_SLOPE, GEO, PLASTIC_GEO = (_STARTS[k] for k in ("SLOPE", "PLASTIC
 INPUTS, GAIN, GAIN_END = _STARTS["INPUTS"], _STARTS["GAIN"], _STARTS["GAIN_END"]
 LAW_SLOPE, RATIO_SLOPE, RATIO_OLD = _STARTS["LAW_SLOPE"], _STARTS["RATIO_SLOPE"], _STARTS["RATIO_OLD"]
 FABRIC_SLOPE = _STARTS["FABRIC_SLOPE"]
-MATRIX, NEWTON, TANGENT, ERRORS = (_STARTS[k] for k in ("MATRIX", "NEWTON", "TANGENT", "ERRORS"))
+MATRIX, NEWTON, MISSING = _STARTS["MATRIX"], _STARTS["NEWTON"], _STARTS["MISSING"]
+TANGENT, ERRORS = _STARTS["TANGENT"], _STARTS["ERRORS"]
+LOW, HIGH, DRIVE, DRIVE_START = (_STARTS[k] for k in ("LOW", "HIGH", "DRIVE", "DRIVE_START"))
 NORM, LENGTH, STRESS_NORM = _STARTS["NORM"], _STARTS["LENGTH"], _STARTS["STRESS_NORM"]
 STRESS_ERROR, FABRIC_ERROR = _STARTS["STRESS_ERROR"], _STARTS["FABRIC_ERROR"]
-FRACTION, PORTION, FACTOR, BEST, ERROR, VOID_START, BY_VOID_STRAIN = (
-    _STARTS[k] for k in ("FRACTION", "PORTION", "FACTOR", "BEST", "ERROR", "VOID_START", "BY_VOID_STRAIN")
+FRACTION, PORTION, FACTOR, BEST, ERROR, VOID_START, CLOSING, BY_VOID_STRAIN = (
+    _STARTS[k] for k in ("FRACTION", "PORTION", "FACTOR", "BEST", "ERROR", "VOID_START", "CLOSING", "BY_VOID_STRAIN")
 )
 
 #: columns of a slope: six stresses, six fabric components, the void ratio; and where those start
