@@ -7,6 +7,7 @@ normal force and the tangential force vector, R = |f_t| / f_n, and `o` the start
 * elastic displacement, exact on a straight force path:  δᵉ = C (Δf_n n + Δf_t / k_tR),  C = compliance / (√f_n + √f_no);
 * sliding done when the force is reached:  λ = max(λ_o, λ_req),
   λ_req = compliance / (2 k_pR) √f_n · tanφ_p R / (tanφ_p − R);
+  (in a relaxed sub-step only a share of λ_req − λ_o, see `integrate`)
 * its displacement, direction and dilatancy taken at the middle force f_m = (f + f_o)/2 (second order):
   δᵖ = (λ − λ_o) [t_m + (tanφ_d − R_m) n].
 """
@@ -16,7 +17,7 @@ import numpy as np
 from ..lanes import LANES, at, kernel, lanes, select
 from .rows import (
     BARE, BARE_SLIPPED, BASE, BUFFER, BY_DILATANCY, BY_FRICTION, D, D_DILATANCY, D_FRICTION, D_LATE, D_SLIPPED,
-    DILATANCY, DISPLACEMENT, FABRIC_MIDDLE, FORCE, FORCE_OLD, FRICTION, H, H_SLIPPED, LATE, MARGIN, SLIPPED,
+    DILATANCY, DISPLACEMENT, FABRIC_MIDDLE, FORCE, FORCE_OLD, FRICTION, H, H_SLIPPED, LATE, MARGIN, SHARE, SLIPPED,
     STIFFNESS, STIFFNESS_SLIPPED, SUMS, T, T_SLIPPED,
 )  # fmt: skip
 
@@ -80,8 +81,9 @@ def contact_plane(rows, before, after, out, n, weight, elastic):
         need = ease_p * compliance * tan_p
         required = need * s * ft * i_room
         done = before[l]
-        slip = np.maximum(required - done, 0.0)
-        on = select(required > done, 1.0, 0.0)
+        share = rows[at(SHARE, l)]
+        slip = share * np.maximum(required - done, 0.0)
+        on = select(required > done, share, 0.0)
         after[l] = done + slip
         ax, ay, az = tx * i_ft, ty * i_ft, tz * i_ft
         by_ratio = need * s * tan_p * fn * fn * i_room * i_room

@@ -13,7 +13,7 @@ from .balance import HALF_SQRT2, contact_density, critical_void_ratio, inverse_f
 from .contact import TINY
 from .rows import (
     BY_FABRIC, BY_VOID, DILATANCY, FABRIC_MIDDLE, FORCE, FORCE_OLD, FRICTION, GEO, INVERSE, LAW_INPUTS, LAW_SLOPE, OLD,
-    PLASTIC_GEO, PSI_P, RATIO_OLD, SCALED, VOID, Y,
+    PLASTIC_GEO, PSI_P, RATIO_OLD, SCALED, SHARE, VOID, Y,
 )  # fmt: skip
 
 
@@ -119,7 +119,8 @@ def plane_change(rows, done, elastic, n, l, small):
     c = compliance / (s + so)
     dc, dc_old = -0.5 / s * c / (s + so), -0.5 / so * c / (s + so)
     required = ease_p * compliance * tan_p * s * ft / room
-    slip = max(required - done, 0.0)
+    share = rows[spot(SHARE, l)]
+    slip = share * max(required - done, 0.0)
     on = 1.0 if required > done else 0.0
     by_ratio = ease_p * compliance * tan_p * tan_p * s * (fn / room) ** 2
     by_tan = -on * ease_p * compliance * s * (ft / room) ** 2
@@ -127,7 +128,7 @@ def plane_change(rows, done, elastic, n, l, small):
     for i in range(3):
         q[i] = on * ((0.5 * required / fn - by_ratio * ratio / fn) * n[i] + by_ratio / fn * t[i] / ft)
         u[i] /= um
-        of_slide[i] = on * (u[i] + (tan_d - ratio_m) * n[i])
+        of_slide[i] = share * on * (u[i] + (tan_d - ratio_m) * n[i])
     for i in range(3):
         e = (fn - gn) * n[i] + ease_t * (t[i] - h[i])
         for k in range(3):
@@ -283,7 +284,8 @@ def advance(rows, slide, base, rule, constants, change, new, dz, dslide, small, 
         if slip > 0.0:
             for c in range(6):
                 dp = (new[0, c] + new[1, c] + new[2, c]) / 3.0
-                dslide[a, c] = by_tan * tan_p * (slope * dp / critical - new[VOID, c] / rows[spot(Y + VOID, l)])
+                change_of_need = by_tan * tan_p * (slope * dp / critical - new[VOID, c] / rows[spot(Y + VOID, l)])
                 for k in range(3):
                     for m in range(3):
-                        dslide[a, c] += q[k] * dz[3 * k + m, c] * n[m]
+                        change_of_need += q[k] * dz[3 * k + m, c] * n[m]
+                dslide[a, c] += rows[spot(SHARE, l)] * (change_of_need - dslide[a, c])

@@ -8,6 +8,10 @@ A round evaluates residual and Jacobian at the trial state of every lane at once
 * under the open pressure: the packing has opened, the rest of the increment is a gap (see `open_point`);
 * out of means: a status code, nothing written.
 
+Where a contact about to slide would have to slide backwards and, held, would be overloaded, the law has no equilibrium
+near by: the packing jumps. The jump is followed with viscous sliding: a relaxed sub-step does a share of the sliding
+required, the rest is left to the next ones and shows in the error reported.
+
 Sub-steps are dyadic fractions of the increment, so that the answer is a smooth function of the increment
 wherever their number does not change, and the tangent returned is its derivative.
 """
@@ -25,7 +29,7 @@ from .residual import FABRIC_WEIGHT, by_ratio, error_norms, fabric_rows, gather,
 from .rows import (
     ACCEPTED, BEST, BY_VOID_STRAIN, CLOSING, D, D_SLIPPED, ERROR, ERRORS, DRIVE, DRIVE_START, FABRIC, FABRIC_ERROR, FACTOR, FORCE, FORCE_OLD,
     FRACTION, FULL, GAIN_END, GEO, H, H_SLIPPED, HIGH, INPUTS, LAW_INPUTS, LENGTH, LOW, MARGIN, MATRIX, MISSING, NEWTON, NORM, OLD, PART,
-    PLASTIC, PLASTIC_GEO, PLASTIC_SLOPE, PORTION, RATIO_OLD, SLOPE, STEP, STRAIN, STRESS_ERROR, STRESS_NORM, T,
+    PLASTIC, PLASTIC_GEO, PLASTIC_SLOPE, PORTION, RATIO_OLD, SHARE, SLOPE, STEP, STRAIN, STRESS_ERROR, STRESS_NORM, T,
     T_SLIPPED, TANGENT, VOID, VOID_START, Y,
 )  # fmt: skip
 
@@ -35,6 +39,7 @@ STALLED = 1e-6  #: residual relative to the sub-step that is taken when rounding
 MAX_ITERATIONS = 30
 MAX_TRIES = 10  #: of one line search
 CONTENT = 0.5  #: part of the residual along the step that may be left, of the other sign
+RELAXABLE = 2.0**-4  #: greatest fraction of an increment for a relaxed sub-step
 SMALLEST = 2.0**-14  #: least fraction of an increment
 MAX_VOID_RATIO = 1.64  #: the contact density ∝ 13.28 − 8 e stays positive
 STRESS_FLOOR = 1e-3  #: of p_ref; below it the error of the stress is not relative
@@ -208,6 +213,7 @@ def next_substep(constants, rule, pool, error, l):
     for a in range(count):
         pool.slide[spot(a, l)] = pool.slide[spot(count + a, l)]
     portion = rows[spot(PORTION, l)]
+    rows[spot(SHARE, l)] = min(4.0 * rows[spot(SHARE, l)], 1.0)
     rows[spot(FRACTION, l)] += portion
     fraction = rows[spot(FRACTION, l)]
     aligned = np.floor(fraction / (2.0 * portion)) * 2.0 * portion == fraction
@@ -233,10 +239,16 @@ def reason(constants, rule, pool, l):
 
 
 @kernel
-def cut(constants, rule, pool, out, factor, l):
-    """Shorten the sub-step; when that is over, open the point or refuse it, and return True."""
+def cut(constants, rule, pool, out, factor, lost, l):
+    """Shorten or relax the sub-step; when that is over, open the point or refuse it, and return True.
+
+    lost: no equilibrium was found. Short sub-steps without one are relaxed: see the module's docstring.
+    """
     rows = pool.rows
-    rows[spot(PORTION, l)] *= factor
+    if lost and rows[spot(PORTION, l)] <= RELAXABLE and 0.25 * rows[spot(SHARE, l)] >= constants.least_share:
+        rows[spot(SHARE, l)] *= 0.25
+    else:
+        rows[spot(PORTION, l)] *= factor
     if rows[spot(PORTION, l)] >= SMALLEST and pool.count[EVALUATIONS, l] < constants.max_evaluations:
         begin(pool, l)
         return False
@@ -265,6 +277,7 @@ def load(constants, rule, pool, data, out, point, l):
     start = (1.0 + void_ratio[point]) * np.exp(-closing * volume) - 1.0
     rows[spot(OLD + VOID, l)], rows[spot(VOID_START, l)], rows[spot(CLOSING, l)] = start, start, closing
     rows[spot(FRACTION, l)], rows[spot(PORTION, l)], rows[spot(ERROR, l)] = 0.0, 1.0, 0.0
+    rows[spot(SHARE, l)] = 1.0
     for a in range(slip.shape[1]):
         total += slip[point, a]
         pool.slide[spot(a, l)] = slip[point, a]
@@ -400,7 +413,7 @@ def settle(constants, components, rule, pool, strain, out, l):
     if pool.count[CODE, l] == ITERATE and take_step(pool, components, constants.evolving, l):
         return False
     if pool.count[CODE, l] != EQUILIBRIUM:
-        return cut(constants, rule, pool, out, 0.25, l)
+        return cut(constants, rule, pool, out, 0.25, True, l)
     if rows[spot(Y, l)] + rows[spot(Y + 1, l)] + rows[spot(Y + 2, l)] < 3.0 * constants.open_pressure:
         open_point(constants, rule, pool, out, l)
         return True
@@ -408,8 +421,9 @@ def settle(constants, components, rule, pool, strain, out, l):
     factor = 0.5
     while factor * factor * error > 0.8 * constants.tolerance and factor > 2.0**-6:
         factor *= 0.5
-    if not error <= constants.tolerance and rows[spot(PORTION, l)] * factor >= SMALLEST:
-        return cut(constants, rule, pool, out, factor, l)
+    relaxed = rows[spot(SHARE, l)] < 1.0
+    if not error <= constants.tolerance and rows[spot(PORTION, l)] * factor >= SMALLEST and not relaxed:
+        return cut(constants, rule, pool, out, factor, False, l)
     rows[spot(ERROR, l)] += error
     pool.count[SUBSTEPS, l] += 1
     collect(pool, components, constants.evolving, l)

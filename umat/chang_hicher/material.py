@@ -35,6 +35,7 @@ class ChangHicher(NamedTuple):
     law: Any = ZhaoKruyt()  #: record of a fabric law
     localisation: Literal["total", "rate"] = "total"
     open_pressure: float = 1e-4  #: mean pressure at which the packing opens, over p_ref [-]; see `opening`
+    relaxation: float = 2.0**-14  #: least share of the sliding done in a relaxed sub-step; 1 refuses instead [-]
     open_stiffness: float = 0.01  #: tangent of an open point, over the elastic one at the open pressure [-]
     tolerance: float = 1e-3  #: on the local error of a sub-step: of the stress relative to its norm, of F [-]
     max_evaluations: int = 2000  #: bound on the work of one point
@@ -78,6 +79,7 @@ def constants_of(material: ChangHicher) -> Constants:
         max_evaluations=int(material.max_evaluations),
         open_pressure=float(material.open_pressure),
         open_stiffness=float(material.open_stiffness),
+        least_share=float(material.relaxation),
     )
 
 

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from ..lanes import LANES, rows
 from .contact import GROUP
-from .rows import BUFFER, OLD, ROWS, VOID, Y
+from .rows import BUFFER, OLD, ROWS, SHARE, VOID, Y
 
 Array = NDArray[np.float64]
 
@@ -24,6 +24,7 @@ class Constants(NamedTuple):
     max_evaluations: int
     open_pressure: float
     open_stiffness: float
+    least_share: float
 
 
 class Pool(NamedTuple):
@@ -55,6 +56,7 @@ def make_pool(n_directions: int, total: bool) -> Pool:
         count=np.zeros((6, LANES), np.int64),
     )  # fmt: skip
     by_row = pool.rows.reshape(ROWS, LANES)
+    by_row[SHARE] = 1.0
     for state in (Y, OLD):
         by_row[state : state + 3] = 1.0
         by_row[state + VOID] = 0.8

@@ -11,7 +11,7 @@ from ..lanes import LANES, at, kernel, lanes
 from .rows import (
     BY_VOID_STRAIN, COLUMNS, DRIVE, ERRORS, FABRIC, FABRIC_ERROR, FABRIC_SLOPE, FIRST, GAIN, GAIN_END, GEO, INPUTS,
     LAW_INPUTS, LAW_SLOPE, LENGTH, MATRIX, MISSING, NEWTON, NORM, OLD, PART, PLASTIC, PLASTIC_SLOPE, PORTION, PSI,
-    PSI_P, RATIO_SLOPE, SLOPE, STEP, STRAIN, STRESS_ERROR, STRESS_NORM, TANGENT, VOID, Y,
+    PSI_P, RATIO_SLOPE, SHARE, SLOPE, STEP, STRAIN, STRESS_ERROR, STRESS_NORM, TANGENT, VOID, Y,
 )  # fmt: skip
 
 FABRIC_WEIGHT = 0.1  #: of the fabric residual beside the strain residual
@@ -173,7 +173,10 @@ def right_hand_sides(rows, components, evolving):
                     void = volume * rows[at(BY_VOID_STRAIN, l)]
                     given = rows[at(PORTION, l)] * rows[at(LAW_SLOPE + LAW_INPUTS * i + 19 + c, l)]
                     rows[at(out, l)] = given - void * rows[at(FABRIC_SLOPE + COLUMNS * i + VOID, l)]
-        copy(rows, ERRORS + row, FIRST + i)
+        for l in lanes():
+            # what a relaxed sub-step left undone is an error too
+            undone = rows[at(PLASTIC + i, l)] * (1.0 / rows[at(SHARE, l)] - 1.0)
+            rows[at(ERRORS + row, l)] = rows[at(FIRST + i, l)] + undone
         if evolving:
             for k in range(6):
                 for l in lanes():

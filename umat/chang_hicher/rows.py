@@ -14,6 +14,7 @@ _COUNTS = {
     "DILATANCY": 1,  # tanφ_d at the middle
     "FABRIC_MIDDLE": 6,  # F at the middle, plain
     "MARGIN": 1,  # positive inside the domain
+    "SHARE": 1,  # of the sliding required that is done in this sub-step; 1 but for relaxed ones
     "BASE": 3,  # the force of the plane that does not come from Z
     # states and unknowns
     "Y": 13,  # trial end of the step: stress, fabric, void ratio
@@ -85,7 +86,7 @@ _STARTS = dict(zip(_COUNTS, accumulate([0, *_COUNTS.values()]), strict=False))
 ROWS = sum(_COUNTS.values())
 
 FORCE, FORCE_OLD, FRICTION, DILATANCY = (_STARTS[k] for k in ("FORCE", "FORCE_OLD", "FRICTION", "DILATANCY"))
-FABRIC_MIDDLE, MARGIN, BASE = (_STARTS[k] for k in ("FABRIC_MIDDLE", "MARGIN", "BASE"))
+FABRIC_MIDDLE, MARGIN, SHARE, BASE = (_STARTS[k] for k in ("FABRIC_MIDDLE", "MARGIN", "SHARE", "BASE"))
 Y, OLD, ACCEPTED, STEP, FULL, PART = (_STARTS[k] for k in ("Y", "OLD", "ACCEPTED", "STEP", "FULL", "PART"))
 INVERSE, SCALED, BY_FABRIC, BY_VOID = (_STARTS[k] for k in ("INVERSE", "SCALED", "BY_FABRIC", "BY_VOID"))
 P_FRICTION, P_DILATANCY = _STARTS["P_FRICTION"], _STARTS["P_DILATANCY"]
