@@ -1,7 +1,7 @@
 """Lanes: points laid side by side, so that one instruction serves several of them.
 
 A quantity of the kernel is a *row* of `LANES` numbers, one for each point in flight; rows lie one after
-another in flat arrays. Kernels are written once: compiled, ``for l in lanes()`` is a loop that the
+another in flat arrays. Kernels are written once: compiled, ``for l in lanes(width)`` is a loop that the
 compiler vectorises; with the compiler switched off (``NUMBA_DISABLE_JIT=1``) it is a single pass with slices,
 and the same source is a plain numpy program. Arithmetic inside such a loop therefore has no branches on data:
 `select`, `np.maximum` and `np.minimum` only.
@@ -18,9 +18,9 @@ LANES = 64 if COMPILED else 256
 if COMPILED:
 
     @njit(nogil=True, error_model="numpy")
-    def lanes():
-        """Indices of all lanes."""
-        return range(LANES)
+    def lanes(width):
+        """Indices of the first lanes."""
+        return range(width)
 
     @njit(nogil=True, error_model="numpy")
     def select(condition, yes, no):
@@ -34,15 +34,15 @@ if COMPILED:
 
 else:
 
-    def lanes():
-        """Return one slice that stands for all lanes."""
-        return (slice(0, LANES),)
+    def lanes(width):
+        """Return one slice that stands for the first lanes."""
+        return (slice(0, width),)
 
     select = np.where
 
     def at(row, lane):
         """Place of a row's entries in a flat array."""
-        return slice(row * LANES, (row + 1) * LANES)
+        return slice(row * LANES + lane.start, row * LANES + lane.stop)
 
 
 @njit(nogil=True, error_model="numpy")

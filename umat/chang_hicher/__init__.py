@@ -24,6 +24,7 @@ from .pool import make_pool
 __all__ = ["ChangHicher", "ChangHicherState"]
 
 _local = threading.local()
+SLICE = 512  #: points that share a pool; fixed, so that results do not depend on the number of threads
 
 
 def _pool(n_directions: int, total: bool) -> Any:
@@ -51,7 +52,7 @@ def _(material: ChangHicher, directions: Directions, strain_increment: ArrayLike
         pool = _pool(len(rule.weights), constants.total)
         integrate(material.law, constants, rule, products, pool, data, out, begin, end)
 
-    map_slices(kernel, n)
+    map_slices(kernel, n, SLICE)
     stress *= material.reference_pressure
     tangent *= material.reference_pressure
     refused = codes != status.OK

@@ -55,9 +55,9 @@ def critical_void_ratio(p, line):
 
 
 @kernel
-def geometry(rows, line, tan_mu, total):
+def geometry(rows, line, tan_mu, total, width):
     """Fill what the contact planes read and the geometry rows, from the trial state and the old one."""
-    for l in lanes():
+    for l in lanes(width):
         a, b, c = rows[at(Y, l)], rows[at(Y + 1, l)], rows[at(Y + 2, l)]
         d, e, f = HALF_SQRT2 * rows[at(Y + 3, l)], HALF_SQRT2 * rows[at(Y + 4, l)], HALF_SQRT2 * rows[at(Y + 5, l)]
         fa, fb, fc = rows[at(Y + 6, l)], rows[at(Y + 7, l)], rows[at(Y + 8, l)]
@@ -103,13 +103,13 @@ def geometry(rows, line, tan_mu, total):
         rows[at(FORCE, l)], rows[at(FORCE + 1, l)], rows[at(FORCE + 2, l)] = z0, z1, z2
         rows[at(FORCE + 3, l)], rows[at(FORCE + 4, l)], rows[at(FORCE + 5, l)] = z3, z4, z5
         rows[at(FORCE + 6, l)], rows[at(FORCE + 7, l)], rows[at(FORCE + 8, l)] = z6, z7, z8
-    friction(rows, line, tan_mu)
+    friction(rows, line, tan_mu, width)
 
 
 @kernel
-def friction(rows, line, tan_mu):
+def friction(rows, line, tan_mu, width):
     """Fill tanφ_p (end), tanφ_d and ψ (middle) and their derivatives; start the margin with the law's own range."""
-    for l in lanes():
+    for l in lanes(width):
         p = (rows[at(Y, l)] + rows[at(Y + 1, l)] + rows[at(Y + 2, l)]) / 3.0
         p_old = (rows[at(OLD, l)] + rows[at(OLD + 1, l)] + rows[at(OLD + 2, l)]) / 3.0
         void, void_old = rows[at(Y + 12, l)], rows[at(OLD + 12, l)]
@@ -187,10 +187,10 @@ def store_nine(rows, first, l, values):
 
 
 @kernel
-def transform(rows, stiffness):
+def transform(rows, stiffness, width):
     """Fill C_{ik,mn} = G_jm⁻¹ H_{ik,jl} SCALED_ln from the rows of H."""
     for ik in range(9):
-        for l in lanes():
+        for l in lanes(width):
             c = times(
                 times(symmetric(rows, INVERSE, l), symmetric(rows, stiffness + 6 * ik, l)), symmetric(rows, SCALED, l)
             )
@@ -198,18 +198,18 @@ def transform(rows, stiffness):
 
 
 @kernel
-def project(rows, displacement, strain):
+def project(rows, displacement, strain, width):
     """Fill the strain sym(D G_m⁻¹), Mandel, and the matrix itself."""
-    for l in lanes():
+    for l in lanes(width):
         product = times(nine(rows, displacement, l), symmetric(rows, INVERSE, l))
         store_nine(rows, PROJECTED, l, product)
         store(rows, strain, l, mandel(product))
 
 
 @kernel
-def friction_columns(rows):
+def friction_columns(rows, width):
     """Fill the derivatives of the strain by p and by e through the friction angles, and the first-order part."""
-    for l in lanes():
+    for l in lanes(width):
         a, b = nine(rows, D_FRICTION, l), symmetric(rows, D_DILATANCY, l)
         g = symmetric(rows, INVERSE, l)
         store(rows, COLUMN_P, l, mandel(times(mixed(a, rows[at(P_FRICTION, l)], b, rows[at(P_DILATANCY, l)]), g)))
@@ -228,13 +228,13 @@ def mixed(a, x, b, y):
 
 
 @kernel
-def by_force(rows, slope, i, j, row, share, total, evolving):
+def by_force(rows, slope, i, j, row, share, total, evolving, width):
     """Fill one row of a slope: strain ij through the forces, by stress, by fabric (if it evolves) and by void ratio.
 
     share (C_{ik,jm} + C_{jk,im}) is the derivative by σ_km; the void ratio scales the forces as the stress does.
     """
     at_i, at_j = C + 27 * i + 3 * j, C + 27 * j + 3 * i
-    for l in lanes():
+    for l in lanes(width):
         k0 = share * (rows[at(at_i, l)] + rows[at(at_j, l)])
         k1 = share * (rows[at(at_i + 1, l)] + rows[at(at_j + 1, l)])
         k2 = share * (rows[at(at_i + 2, l)] + rows[at(at_j + 2, l)])
@@ -265,11 +265,11 @@ def transposed(a):
 
 
 @kernel
-def by_density(rows, slope, geo, third, i, j, share):
+def by_density(rows, slope, geo, third, i, j, share, width):
     """Add to one row of a slope, and keep, the derivative by F through the density of contacts and through G_m⁻¹."""
     j0, j1, j2 = pair_row(0, j), pair_row(1, j), pair_row(2, j)
     i0, i1, i2 = pair_row(0, i), pair_row(1, i), pair_row(2, i)
-    for l in lanes():
+    for l in lanes(width):
         gj = (rows[at(j0, l)], rows[at(j1, l)], rows[at(j2, l)])
         gi = (rows[at(i0, l)], rows[at(i1, l)], rows[at(i2, l)])
         ai, bi, ci = half_share(rows, third + 10 * i, gj, l)
@@ -320,14 +320,14 @@ def half_share(rows, t, g, l):
 
 
 @kernel
-def strain_and_slope(rows, displacement, stiffness, third, strain, slope, geo, total, evolving):
+def strain_and_slope(rows, displacement, stiffness, third, strain, slope, geo, total, evolving, width):
     """Fill a strain (all of it, or its plastic part) and its derivative, from the rows of its D, H and T."""
-    project(rows, displacement, strain)
-    transform(rows, stiffness)
+    project(rows, displacement, strain, width)
+    transform(rows, stiffness, width)
     for row in range(6):
         i = row if row < 3 else (1 if row == 3 else 0)
         j = row if row < 3 else (2 if row < 5 else 1)
         share = 0.5 if row < 3 else HALF_SQRT2
-        by_force(rows, slope + COLUMNS * row, i, j, row, share, total, evolving)
+        by_force(rows, slope + COLUMNS * row, i, j, row, share, total, evolving, width)
         if evolving:
-            by_density(rows, slope + COLUMNS * row, geo + 6 * row, third, i, j, share)
+            by_density(rows, slope + COLUMNS * row, geo + 6 * row, third, i, j, share, width)

@@ -27,7 +27,7 @@ GROUP = 4  #: directions whose contributions are added in one pass over the sums
 
 
 @kernel
-def contact_plane(rows, before, after, out, n, weight, elastic):
+def contact_plane(rows, before, after, out, n, weight, elastic, width):
     """Fill one direction's buffer `out` with displacements and their derivatives, times the direction's weight.
 
     rows: the lanes, flat; before, after: rows of the sliding done before and after the step; out: `BUFFER` rows, flat
@@ -35,7 +35,7 @@ def contact_plane(rows, before, after, out, n, weight, elastic):
     """
     compliance, ease_t, ease_p = elastic
     nx, ny, nz = n
-    for l in lanes():
+    for l in lanes(width):
         # forces
         bx, by, bz = rows[at(BASE, l)], rows[at(BASE + 1, l)], rows[at(BASE + 2, l)]
         fx = bx + rows[at(FORCE, l)] * nx + rows[at(FORCE + 1, l)] * ny + rows[at(FORCE + 2, l)] * nz
@@ -140,7 +140,7 @@ def contact_plane(rows, before, after, out, n, weight, elastic):
 
 
 @kernel
-def add_moments(rows, buffer, table, first, terms):
+def add_moments(rows, buffer, table, first, terms, width):
     """Add the buffered rows of `GROUP` directions, times their moments of n, to the sums, three sums at a time.
 
     terms: (buffer row, three out rows, three columns of the moments); table: the moments of every direction.
@@ -151,7 +151,7 @@ def add_moments(rows, buffer, table, first, terms):
         a0, a1, a2, a3 = table[first, c0], table[first + 1, c0], table[first + 2, c0], table[first + 3, c0]
         b0, b1, b2, b3 = table[first, c1], table[first + 1, c1], table[first + 2, c1], table[first + 3, c1]
         d0, d1, d2, d3 = table[first, c2], table[first + 1, c2], table[first + 2, c2], table[first + 3, c2]
-        for l in lanes():
+        for l in lanes(width):
             x0, x1 = buffer[at(row, l)], buffer[at(row + BUFFER, l)]
             x2, x3 = buffer[at(row + 2 * BUFFER, l)], buffer[at(row + 3 * BUFFER, l)]
             rows[at(t0, l)] += x0 * a0 + x1 * a1 + x2 * a2 + x3 * a3
@@ -160,21 +160,23 @@ def add_moments(rows, buffer, table, first, terms):
 
 
 @kernel
-def sum_planes(rows, slide, base, buffer, rule, terms, fabric_terms, elastic, total, evolving):
+def sum_planes(rows, slide, base, buffer, rule, terms, fabric_terms, elastic, total, evolving, width):
     """Sum displacement, its moments and derivatives over all contact planes, into the rows from `SUMS` on."""
     normals, weights, table = rule
     count = weights.shape[0]
-    for i in range(SUMS * LANES, (SUMS + 210) * LANES):
-        rows[i] = 0.0
+    for i in range(SUMS, SUMS + 210):
+        for l in lanes(width):
+            rows[at(i, l)] = 0.0
     for first in range(0, count, GROUP):
         for k in range(GROUP):
             a = first + k
             if not total:
-                for i in range(3 * LANES):
-                    rows[BASE * LANES + i] = base[3 * a * LANES + i]
+                for i in range(3):
+                    for l in lanes(width):
+                        rows[at(BASE + i, l)] = base[at(3 * a + i, l)]
             n = (normals[a, 0], normals[a, 1], normals[a, 2])
             before, after = slide[a * LANES : (a + 1) * LANES], slide[(count + a) * LANES : (count + a + 1) * LANES]
-            contact_plane(rows, before, after, buffer[k * SIZE : (k + 1) * SIZE], n, weights[a], elastic)
-        add_moments(rows, buffer, table, first, terms)
+            contact_plane(rows, before, after, buffer[k * SIZE : (k + 1) * SIZE], n, weights[a], elastic, width)
+        add_moments(rows, buffer, table, first, terms, width)
         if evolving:
-            add_moments(rows, buffer, table, first, fabric_terms)
+            add_moments(rows, buffer, table, first, fabric_terms, width)

@@ -29,7 +29,7 @@ from .residual import FABRIC_WEIGHT, by_ratio, error_norms, fabric_rows, gather,
 from .rows import (
     ACCEPTED, BEST, BY_VOID_STRAIN, CLOSING, D, D_SLIPPED, ERROR, ERRORS, DRIVE, DRIVE_START, FABRIC, FABRIC_ERROR, FACTOR, FORCE, FORCE_OLD,
     FRACTION, FULL, GAIN_END, GEO, H, H_SLIPPED, HIGH, INPUTS, LAW_INPUTS, LENGTH, LOW, MARGIN, MATRIX, MISSING, NEWTON, NORM, OLD, PART,
-    PLASTIC, PLASTIC_GEO, PLASTIC_SLOPE, PORTION, RATIO_OLD, SHARE, SLOPE, STEP, STRAIN, STRESS_ERROR, STRESS_NORM, T,
+    PLASTIC, PLASTIC_GEO, PLASTIC_SLOPE, PORTION, RATIO_OLD, ROWS, SHARE, SLOPE, STEP, STRAIN, STRESS_ERROR, STRESS_NORM, T,
     T_SLIPPED, TANGENT, VOID, VOID_START, Y,
 )  # fmt: skip
 
@@ -44,26 +44,27 @@ SMALLEST = 2.0**-14  #: least fraction of an increment
 MAX_VOID_RATIO = 1.64  #: the contact density ∝ 13.28 − 8 e stays positive
 STRESS_FLOOR = 1e-3  #: of p_ref; below it the error of the stress is not relative
 NEARLY_OPEN = 20.0  #: times the open pressure: a point that fails below it opens
+VECTOR = 8  #: numbers that one instruction handles, at most
 IDLE, TRIAL, ITERATE, EQUILIBRIUM, CUT = 0, 1, 2, 3, 4
 POINT, EVALUATIONS, SUBSTEPS, ITERATIONS, TRIES, CODE = 0, 1, 2, 3, 4, 5
 
 
 @kernel
-def evaluate(law, constants, rule, terms, pool):
+def evaluate(law, constants, rule, terms, pool, width):
     """Evaluate residual and Jacobian at every lane's trial state."""
     rows, total, evolving = pool.rows, constants.total, constants.evolving
-    geometry(rows, constants.line, constants.tan_mu, total)
+    geometry(rows, constants.line, constants.tan_mu, total, width)
     sum_planes(
-        rows, pool.slide, pool.base, pool.buffer, rule, terms.always, terms.evolving, constants.elastic, total, evolving
+        rows, pool.slide, pool.base, pool.buffer, rule, terms.always, terms.evolving, constants.elastic, total, evolving, width
     )
-    friction_columns(rows)
-    strain_and_slope(rows, D, H, T, STRAIN, SLOPE, GEO, total, evolving)
+    friction_columns(rows, width)
+    strain_and_slope(rows, D, H, T, STRAIN, SLOPE, GEO, total, evolving, width)
     if evolving:
-        strain_and_slope(rows, D_SLIPPED, H_SLIPPED, T_SLIPPED, PLASTIC, PLASTIC_SLOPE, PLASTIC_GEO, total, evolving)
-        law_inputs(rows, 0.5)
-        fabric_rows(law, rows)
-    gather(rows, terms.components, evolving)
-    norms(rows, terms.components, evolving)
+        strain_and_slope(rows, D_SLIPPED, H_SLIPPED, T_SLIPPED, PLASTIC, PLASTIC_SLOPE, PLASTIC_GEO, total, evolving, width)
+        law_inputs(rows, 0.5, width)
+        fabric_rows(law, rows, width)
+    gather(rows, terms.components, evolving, width)
+    norms(rows, terms.components, evolving, width)
 
 
 @kernel
@@ -435,52 +436,72 @@ def settle(constants, components, rule, pool, strain, out, l):
 
 
 @kernel
-def solve_lanes(law, constants, rule, components, pool, equilibrium):
+def solve_lanes(law, constants, rule, components, pool, equilibrium, width):
     """Solve every lane's system for the Newton step, and where some lane is in equilibrium for tangent and error."""
     rows, evolving = pool.rows, constants.evolving
     n = components.shape[0] * (2 if evolving else 1)
-    factorise(rows, MATRIX, n)
-    solve(rows, MATRIX, NEWTON, n, 1)
+    factorise(rows, MATRIX, n, width)
+    solve(rows, MATRIX, NEWTON, n, 1, width)
     if not equilibrium:
         return
     if evolving:
-        law_inputs(rows, 1.0)
-        increments(law, rows[INPUTS * LANES : (INPUTS + LAW_INPUTS) * LANES], rows[GAIN_END * LANES :])
+        law_inputs(rows, 1.0, width)
+        increments(law, rows[INPUTS * LANES : (INPUTS + LAW_INPUTS) * LANES], rows[GAIN_END * LANES :], width)
         if 13 in active_inputs(law):
-            by_ratio(rows, OLD, RATIO_OLD)
-    right_hand_sides(rows, components, evolving)
-    for l in range(LANES):
+            by_ratio(rows, OLD, RATIO_OLD, width)
+    right_hand_sides(rows, components, evolving, width)
+    for l in range(width):
         if pool.count[CODE, l] == EQUILIBRIUM and rows[spot(FRACTION, l)] > 0.0:
             through_start(law, constants, rule, components, pool, l)
-    solve(rows, MATRIX, TANGENT, n, 6)
-    solve(rows, MATRIX, ERRORS, n, 1)
-    error_norms(rows, components, evolving)
+    solve(rows, MATRIX, TANGENT, n, 6, width)
+    solve(rows, MATRIX, ERRORS, n, 1, width)
+    error_norms(rows, components, evolving, width)
+
+
+@kernel
+def move(pool, source, target):
+    """Copy a lane to another place."""
+    for row in range(ROWS):
+        pool.rows[spot(row, target)] = pool.rows[spot(row, source)]
+    for a in range(pool.dslide.shape[1]):
+        pool.slide[spot(a, target)] = pool.slide[spot(a, source)]
+    for a in range(pool.base.shape[0] // LANES):
+        pool.base[spot(a, target)] = pool.base[spot(a, source)]
+    assign(pool.change[target], pool.change[source])
+    assign(pool.dz[target], pool.dz[source])
+    assign(pool.dslide[target], pool.dslide[source])
+    for k in range(6):
+        pool.count[k, target] = pool.count[k, source]
 
 
 @kernel
 def integrate(law, constants, rule, terms, pool, data, out, start, stop):
     """Integrate the points start…stop-1; see the module's docstring."""
     components, count = terms.components, pool.count
-    following, active = start, 0
-    for l in range(LANES):
-        following = fill(constants, rule, pool, data, out, following, stop, l)
-        active += count[CODE, l] != IDLE
-    while active > 0:
+    following, held = start, 0
+    while held < LANES and following < stop:
+        following = fill(constants, rule, pool, data, out, following, stop, held)
+        held += count[CODE, held] != IDLE
+    while held > 0:
+        # lanes in use lie side by side at the front; the few beyond them fill the vector
+        width = min(VECTOR * ((held + VECTOR - 1) // VECTOR), LANES)
         solving, equilibrium = False, False
-        evaluate(law, constants, rule, terms, pool)
-        for l in range(LANES):
-            if count[CODE, l] != IDLE:
-                count[CODE, l] = judge(pool, l)
-                solving = solving or count[CODE, l] != TRIAL
-                equilibrium = equilibrium or count[CODE, l] == EQUILIBRIUM
+        evaluate(law, constants, rule, terms, pool, width)
+        for l in range(held):
+            count[CODE, l] = judge(pool, l)
+            solving = solving or count[CODE, l] != TRIAL
+            equilibrium = equilibrium or count[CODE, l] == EQUILIBRIUM
         if not solving:
             continue
-        solve_lanes(law, constants, rule, components, pool, equilibrium)
-        active = 0
-        for l in range(LANES):
+        solve_lanes(law, constants, rule, components, pool, equilibrium, width)
+        for l in range(held - 1, -1, -1):
             if count[CODE, l] > TRIAL:
                 if settle(constants, components, rule, pool, data[6], out, l):
                     following = fill(constants, rule, pool, data, out, following, stop, l)
                 else:
                     count[CODE, l] = TRIAL
-            active += count[CODE, l] != IDLE
+            if count[CODE, l] == IDLE:
+                held -= 1
+                if held > l:
+                    move(pool, held, l)
+                count[CODE, held] = IDLE

@@ -67,13 +67,13 @@ def active_inputs(law: Any) -> tuple[int, ...]:
     return _LAWS[type(law)].inputs
 
 
-def slope_of(law: Any, inputs: Any, slope: Any) -> None:
+def slope_of(law: Any, inputs: Any, slope: Any, width: int) -> None:
     """Fill the derivative of the increment, rows 31 i + k, from the inputs' rows (both flat)."""
     entry = _LAWS[type(law)]
     if entry.slope is None:
-        complex_slope(law, inputs, slope)
+        complex_slope(law, inputs, slope, width)
     else:
-        entry.slope(law, inputs, slope)
+        entry.slope(law, inputs, slope, width)
 
 
 if COMPILED:
@@ -88,10 +88,10 @@ if COMPILED:
         return lambda law: inputs
 
     @overload(slope_of)
-    def _slope_of(law, inputs, slope):
+    def _slope_of(law, inputs, slope, width):
         entry = _LAWS[law.instance_class]
         if entry.slope is None:
-            return lambda law, inputs, slope: complex_slope(law, inputs, slope)
+            return lambda law, inputs, slope, width: complex_slope(law, inputs, slope, width)
         return entry.slope.py_func
 
 
@@ -124,9 +124,9 @@ def _shifted(values, first, k):
 
 
 @kernel
-def increments(law, inputs, out):
+def increments(law, inputs, out, width):
     """Fill six rows with the law's increments from the rows of its inputs (both flat)."""
-    for l in lanes():
+    for l in lanes(width):
         a, b, c, d, e, f = fabric_increment(
             law,
             six(inputs, 0, l),
@@ -141,10 +141,10 @@ def increments(law, inputs, out):
 
 
 @kernel
-def complex_slope(law, inputs, slope):
+def complex_slope(law, inputs, slope, width):
     """Fill the derivative of any law by complex steps."""
     for k in active_inputs(law):
-        for l in lanes():
+        for l in lanes(width):
             values = fabric_increment(
                 law,
                 _shifted(six(inputs, 0, l), 0, k),

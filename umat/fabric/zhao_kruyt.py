@@ -28,10 +28,10 @@ class ZhaoKruyt(NamedTuple):
 
 
 @kernel
-def _slope(law, inputs, slope):
+def _slope(law, inputs, slope, width):
     """Derivative of `increment`, written out: ΔF = h (F_c − a X) u with u the plastic deviator, a = F:u/‖u‖."""
     extension = law.extension
-    for l in lanes():
+    for l in lanes(width):
         fabric, stress, psi = six(inputs, 0, l), six(inputs, 6, l), inputs[at(12, l)]
         u = deviator(six(inputs, 25, l))
         g = np.sqrt(dot(u, u) + TINY)
