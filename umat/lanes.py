@@ -15,19 +15,26 @@ COMPILED = not numba.config.DISABLE_JIT
 #: Points in flight in one kernel. 64 fills the vector units and still lives in the caches.
 LANES = 64 if COMPILED else 256
 
+_OPTIONS = {"nogil": True, "error_model": "numpy", "fastmath": {"contract"}}
+#: Decorator of what Python calls: kept on disk from one session to the next.
+entry = njit(cache=True, **_OPTIONS)
+#: Decorator of what only kernels call: no global lock, C arithmetic, multiply–add fused (the same on every run), and
+#: no wrappers for Python, which would take longer to compile than the functions.
+kernel = njit(no_cpython_wrapper=True, no_cfunc_wrapper=True, **_OPTIONS)
+
 if COMPILED:
 
-    @njit(nogil=True, error_model="numpy")
+    @kernel
     def lanes(width):
         """Indices of the first lanes."""
         return range(width)
 
-    @njit(nogil=True, error_model="numpy")
+    @kernel
     def select(condition, yes, no):
         """Choose between two numbers."""
         return yes if condition else no
 
-    @njit(nogil=True, error_model="numpy")
+    @kernel
     def at(row, lane):
         """Place of a row's entry in a flat array (unsigned: no test for a negative index in the inner loop)."""
         return np.uint64(row) * np.uint64(LANES) + np.uint64(lane)
@@ -45,7 +52,7 @@ else:
         return slice(row * LANES + lane.start, row * LANES + lane.stop)
 
 
-@njit(nogil=True, error_model="numpy")
+@kernel
 def spot(row, lane):
     """Place of one number, for loops over single lanes."""
     return row * LANES + lane
@@ -54,7 +61,3 @@ def spot(row, lane):
 def rows(count: int) -> np.ndarray:
     """Return zeroed storage for `count` rows, flat."""
     return np.zeros(count * LANES)
-
-
-#: Decorator of the lane kernels: no global lock, C arithmetic, multiply–add fused (the same on every run).
-kernel = njit(nogil=True, error_model="numpy", cache=True, fastmath={"contract"})

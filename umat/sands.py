@@ -17,9 +17,9 @@ TOYOURA_FABRIC_NORM = 0.208
 def toyoura(newtons: float = 1e3, metres: float = 1.0) -> ChangHicher:
     """Return Toyoura sand [ZK Table 4] in the units given; defaults kN, m, kPa.
 
-    e_ref, λ_c, ξ, k_n0, φ_μ, k_tR, k_pR, M_c, c, F_c0, h, m: [ZK Table 4]. p_ref = 101.3 kPa (atmospheric). The source does
-    not state f_ref: 0.005 N gives the least error in σ1/σ3 against the four loose and medium drained tests of
-    Verdugo & Ishihara (1996) in the Sand Triaxial Test Database.
+    e_ref, λ_c, ξ, k_n0, φ_μ, k_tR, k_pR, M_c, c, F_c0, h, m: [ZK Table 4]. p_ref = 101.3 kPa (atmospheric). The
+    source does not state f_ref: 0.005 N gives the least error in σ1/σ3 against the four loose and medium drained tests
+    of Verdugo & Ishihara (1996) in the Sand Triaxial Test Database.
     """
     law = ZhaoKruyt(h=10.0, m=0.4, critical_fabric=0.48, critical_ratio=1.25, extension=0.75)
     return _in_units(newtons, metres, 0.934, 0.019, 0.7, 4.5, 27.0, 0.5, 0.7, 0.005, law)
@@ -28,8 +28,8 @@ def toyoura(newtons: float = 1e3, metres: float = 1.0) -> ChangHicher:
 def dem_yang_wu(newtons: float = 1e3, metres: float = 1.0) -> ChangHicher:
     """Return the discrete-element samples of Yang & Wu [ZK Appendix] in the units given; defaults kN, m, kPa.
 
-    e_ref, λ_c, ξ, k_n0, φ_μ, k_tR, k_pR: [ZK Appendix]. Its Table 2 cannot be read in our copy: F_c0, h, m, M_c and c are Toyoura's,
-    and so is f_ref.
+    e_ref, λ_c, ξ, k_n0, φ_μ, k_tR, k_pR: [ZK Appendix]. Its Table 2 cannot be read in our copy: F_c0, h, m, M_c and c
+    are Toyoura's, and so is f_ref.
     """
     law = ZhaoKruyt(h=10.0, m=0.4, critical_fabric=0.48, critical_ratio=1.25, extension=0.75)
     return _in_units(newtons, metres, 0.862, 0.021, 0.7, 18.0, 25.0, 0.6, 0.5, 0.005, law)

@@ -2,7 +2,8 @@
 
 `material` parameters and state, `contact` one contact plane, `balance` the averages over planes, `residual` the
 equations of a step, `elimination` their linear systems, `history` the chain of sub-steps, `integrate` the step
-control of each point, `rows` and `pool` storage, `planes` directions and what is summed over them. The derivation is in `docs/theory.md`.
+control of each point, `rows` and `pool` storage, `planes` directions and what is summed over them. The derivation is
+in `docs/theory.md`.
 """
 
 import threading
@@ -13,7 +14,15 @@ from numpy.typing import ArrayLike
 
 from .. import status
 from ..directions import Directions
-from ..interface import Response, checked_vectors, elastic_tangent, initial_state, state_fields, symmetric_tangent, update
+from ..interface import (
+    Response,
+    checked_vectors,
+    elastic_tangent,
+    initial_state,
+    state_fields,
+    symmetric_tangent,
+    update,
+)
 from ..mandel import Array
 from ..threads import map_slices
 from .integrate import integrate

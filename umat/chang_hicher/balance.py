@@ -16,9 +16,35 @@ import numpy as np
 from ..fabric.law import dot, plus, scaled, six
 from ..lanes import at, kernel, lanes
 from .rows import (
-    BY_FABRIC, BY_VOID, C, COLUMN_E, COLUMN_P, COLUMNS, D_DILATANCY, D_FRICTION, D_LATE, DILATANCY, E_DILATANCY,
-    E_FRICTION, FABRIC, FABRIC_MIDDLE, FIRST, FORCE, FORCE_OLD, FRICTION, INVERSE, MARGIN, OLD, P_DILATANCY,
-    P_FRICTION, PROJECTED, PSI, PSI_P, SCALED, VOID, Y,
+    BY_FABRIC,
+    BY_VOID,
+    COLUMN_E,
+    COLUMN_P,
+    COLUMNS,
+    D_DILATANCY,
+    D_FRICTION,
+    D_LATE,
+    DILATANCY,
+    E_DILATANCY,
+    E_FRICTION,
+    FABRIC,
+    FABRIC_MIDDLE,
+    FIRST,
+    FORCE,
+    FORCE_OLD,
+    FRICTION,
+    INVERSE,
+    MARGIN,
+    OLD,
+    P_DILATANCY,
+    P_FRICTION,
+    PROJECTED,
+    PSI,
+    PSI_P,
+    SCALED,
+    VOID,
+    C,
+    Y,
 )  # fmt: skip
 
 SQRT2 = 2.0**0.5
@@ -62,7 +88,11 @@ def geometry(rows, line, tan_mu, total, width):
         d, e, f = HALF_SQRT2 * rows[at(Y + 3, l)], HALF_SQRT2 * rows[at(Y + 4, l)], HALF_SQRT2 * rows[at(Y + 5, l)]
         fa, fb, fc = rows[at(Y + 6, l)], rows[at(Y + 7, l)], rows[at(Y + 8, l)]
         fd, fe, ff = HALF_SQRT2 * rows[at(Y + 9, l)], HALF_SQRT2 * rows[at(Y + 10, l)], HALF_SQRT2 * rows[at(Y + 11, l)]
-        ma, mb, mc = 0.5 * (fa + rows[at(OLD + 6, l)]), 0.5 * (fb + rows[at(OLD + 7, l)]), 0.5 * (fc + rows[at(OLD + 8, l)])
+        ma, mb, mc = (
+            0.5 * (fa + rows[at(OLD + 6, l)]),
+            0.5 * (fb + rows[at(OLD + 7, l)]),
+            0.5 * (fc + rows[at(OLD + 8, l)]),
+        )
         md = 0.5 * (fd + HALF_SQRT2 * rows[at(OLD + 9, l)])
         me = 0.5 * (fe + HALF_SQRT2 * rows[at(OLD + 10, l)])
         mf = 0.5 * (ff + HALF_SQRT2 * rows[at(OLD + 11, l)])
@@ -97,9 +127,9 @@ def geometry(rows, line, tan_mu, total, width):
         rows[at(BY_FABRIC + 6, l)], rows[at(BY_FABRIC + 7, l)], rows[at(BY_FABRIC + 8, l)] = k * z6, k * z7, k * z8
         rows[at(BY_VOID, l)] = -half * d_density * scale
         if not total:
-            z0, z1, z2 = z0 + rows[at(FORCE_OLD, l)], z1 + rows[at(FORCE_OLD + 1, l)], z2 + rows[at(FORCE_OLD + 2, l)]
-            z3, z4, z5 = z3 + rows[at(FORCE_OLD + 3, l)], z4 + rows[at(FORCE_OLD + 4, l)], z5 + rows[at(FORCE_OLD + 5, l)]
-            z6, z7, z8 = z6 + rows[at(FORCE_OLD + 6, l)], z7 + rows[at(FORCE_OLD + 7, l)], z8 + rows[at(FORCE_OLD + 8, l)]
+            z0, z1, z2, z3, z4, z5, z6, z7, z8 = mixed(
+                (z0, z1, z2, z3, z4, z5, z6, z7, z8), 1.0, nine(rows, FORCE_OLD, l), 1.0
+            )
         rows[at(FORCE, l)], rows[at(FORCE + 1, l)], rows[at(FORCE + 2, l)] = z0, z1, z2
         rows[at(FORCE + 3, l)], rows[at(FORCE + 4, l)], rows[at(FORCE + 5, l)] = z3, z4, z5
         rows[at(FORCE + 6, l)], rows[at(FORCE + 7, l)], rows[at(FORCE + 8, l)] = z6, z7, z8
@@ -122,7 +152,10 @@ def friction(rows, line, tan_mu, width):
         tan_d = void * i_critical * tan_mu
         rows[at(FRICTION, l)] = tan_p
         rows[at(DILATANCY, l)] = 0.5 * (tan_d + void_old / critical_old * tan_mu)
-        rows[at(P_FRICTION, l)], rows[at(P_DILATANCY, l)] = tan_p * i_critical * slope, -0.5 * tan_d * i_critical * slope
+        rows[at(P_FRICTION, l)], rows[at(P_DILATANCY, l)] = (
+            tan_p * i_critical * slope,
+            -0.5 * tan_d * i_critical * slope,
+        )
         rows[at(E_FRICTION, l)], rows[at(E_DILATANCY, l)] = -tan_p * i_void, 0.5 * tan_d * i_void
         middle, slope = critical_void_ratio(0.5 * (p + p_old), line)
         rows[at(PSI, l)], rows[at(PSI_P, l)] = 0.5 * (void + void_old) - middle, slope
@@ -246,10 +279,9 @@ def by_force(rows, slope, i, j, row, share, total, evolving, width):
         k8 = share * (rows[at(at_i + 20, l)] + rows[at(at_j + 20, l)])
         k = (k0, k1, k2, k3, k4, k5, k6, k7, k8)
         s = mandel(k)
-        if total:
-            scale = dot(s, six(rows, Y, l))
-        else:
-            scale = dot(s, six(rows, Y, l)) - dot(s, six(rows, OLD, l))
+        scale = dot(s, six(rows, Y, l))
+        if not total:
+            scale = scale - dot(s, six(rows, OLD, l))
         p = rows[at(COLUMN_P + row, l)] / 3.0
         store(rows, slope, l, (s[0] + p, s[1] + p, s[2] + p, s[3], s[4], s[5]))
         rows[at(slope + VOID, l)] = scale * rows[at(BY_VOID, l)] + rows[at(COLUMN_E + row, l)]

@@ -4,7 +4,8 @@ Everything here is dimensionless: stress over p_ref, force over p_ref r², displ
 radius), which leaves one elastic constant, compliance = √(f_ref p_ref) / k_n0. With f_n, f_t the
 normal force and the tangential force vector, R = |f_t| / f_n, and `o` the start of the step [ZK Table 3]:
 
-* elastic displacement, exact on a straight force path:  δᵉ = C (Δf_n n + Δf_t / k_tR),  C = compliance / (√f_n + √f_no);
+* elastic displacement, exact on a straight force path:
+  δᵉ = C (Δf_n n + Δf_t / k_tR),  C = compliance / (√f_n + √f_no);
 * sliding done when the force is reached:  λ = max(λ_o, λ_req),
   λ_req = compliance / (2 k_pR) √f_n · tanφ_p R / (tanφ_p − R);
   (in a relaxed sub-step only a share of λ_req − λ_o, see `integrate`)
@@ -16,9 +17,25 @@ import numpy as np
 
 from ..lanes import LANES, at, kernel, lanes, select
 from .rows import (
-    BARE, BARE_SLIPPED, BASE, BUFFER, BY_DILATANCY, BY_FRICTION, D, D_DILATANCY, D_FRICTION, D_LATE, D_SLIPPED,
-    DILATANCY, DISPLACEMENT, FABRIC_MIDDLE, FORCE, FORCE_OLD, FRICTION, H, H_SLIPPED, LATE, MARGIN, SHARE, SLIPPED,
-    STIFFNESS, STIFFNESS_SLIPPED, SUMS, T, T_SLIPPED,
+    BARE,
+    BARE_SLIPPED,
+    BASE,
+    BUFFER,
+    BY_DILATANCY,
+    BY_FRICTION,
+    DILATANCY,
+    DISPLACEMENT,
+    FABRIC_MIDDLE,
+    FORCE,
+    FORCE_OLD,
+    FRICTION,
+    LATE,
+    MARGIN,
+    SHARE,
+    SLIPPED,
+    STIFFNESS,
+    STIFFNESS_SLIPPED,
+    SUMS,
 )  # fmt: skip
 
 TINY = 1e-200
@@ -31,7 +48,8 @@ def contact_plane(rows, before, after, out, n, weight, elastic, width):
     """Fill one direction's buffer `out` with displacements and their derivatives, times the direction's weight.
 
     rows: the lanes, flat; before, after: rows of the sliding done before and after the step; out: `BUFFER` rows, flat
-    (arrays of their own, and constant places in them, or the compiler sees too many overlaps to check); elastic: (compliance, 1/k_tR, 1/(2 k_pR)).
+    (arrays of their own, and constant places in them, or the compiler sees too many overlaps to check);
+    elastic: (compliance, 1/k_tR, 1/(2 k_pR)).
     """
     compliance, ease_t, ease_p = elastic
     nx, ny, nz = n
@@ -57,7 +75,12 @@ def contact_plane(rows, before, after, out, n, weight, elastic, width):
             rows[at(FABRIC_MIDDLE, l)] * nx * nx
             + rows[at(FABRIC_MIDDLE + 1, l)] * ny * ny
             + rows[at(FABRIC_MIDDLE + 2, l)] * nz * nz
-            + 2.0 * (rows[at(FABRIC_MIDDLE + 3, l)] * ny * nz + rows[at(FABRIC_MIDDLE + 4, l)] * nx * nz + rows[at(FABRIC_MIDDLE + 5, l)] * nx * ny)
+            + 2.0
+            * (
+                rows[at(FABRIC_MIDDLE + 3, l)] * ny * nz
+                + rows[at(FABRIC_MIDDLE + 4, l)] * nx * nz
+                + rows[at(FABRIC_MIDDLE + 5, l)] * nx * ny
+            )
         )
         # inside only if force and density are positive; the arithmetic below stays finite in any case
         rows[at(MARGIN, l)] = np.minimum(rows[at(MARGIN, l)], np.minimum(room / gn, density))
@@ -89,7 +112,11 @@ def contact_plane(rows, before, after, out, n, weight, elastic, width):
         by_ratio = need * s * tan_p * fn * fn * i_room * i_room
         along_n = required * 0.5 * i_fn - by_ratio * ratio * i_fn
         along_t = by_ratio * i_fn
-        qx, qy, qz = on * (along_n * nx + along_t * ax), on * (along_n * ny + along_t * ay), on * (along_n * nz + along_t * az)
+        qx, qy, qz = (
+            on * (along_n * nx + along_t * ax),
+            on * (along_n * ny + along_t * ay),
+            on * (along_n * nz + along_t * az),
+        )
         by_tan = -on * ease_p * compliance * s * ft * ft * i_room * i_room
         # direction of sliding at the middle and at the end
         ux, uy, uz = ux * i_um, uy * i_um, uz * i_um
@@ -119,7 +146,11 @@ def contact_plane(rows, before, after, out, n, weight, elastic, width):
         out[at(LATE, l)] = lag * (ax - ux + late * nx)
         out[at(LATE + 1, l)] = lag * (ay - uy + late * ny)
         out[at(LATE + 2, l)] = lag * (az - uz + late * nz)
-        out[at(BY_FRICTION, l)], out[at(BY_FRICTION + 1, l)], out[at(BY_FRICTION + 2, l)] = w * by_tan * mx, w * by_tan * my, w * by_tan * mz
+        out[at(BY_FRICTION, l)], out[at(BY_FRICTION + 1, l)], out[at(BY_FRICTION + 2, l)] = (
+            w * by_tan * mx,
+            w * by_tan * my,
+            w * by_tan * mz,
+        )
         out[at(BY_DILATANCY, l)] = lag
         cn, ct = w * c * (1.0 - ease_t), w * c * ease_t
         wd = w * dc
@@ -132,11 +163,27 @@ def contact_plane(rows, before, after, out, n, weight, elastic, width):
         out[at(STIFFNESS + 6, l)] = cn * nx * nz + wd * ez * nx + w * pzx
         out[at(STIFFNESS + 7, l)] = cn * ny * nz + wd * ez * ny + w * pzy
         out[at(STIFFNESS + 8, l)] = ct + cn * nz * nz + wd * ez * nz + w * pzz
-        out[at(STIFFNESS_SLIPPED, l)], out[at(STIFFNESS_SLIPPED + 1, l)], out[at(STIFFNESS_SLIPPED + 2, l)] = w * pxx, w * pxy, w * pxz
-        out[at(STIFFNESS_SLIPPED + 3, l)], out[at(STIFFNESS_SLIPPED + 4, l)], out[at(STIFFNESS_SLIPPED + 5, l)] = w * pyx, w * pyy, w * pyz
-        out[at(STIFFNESS_SLIPPED + 6, l)], out[at(STIFFNESS_SLIPPED + 7, l)], out[at(STIFFNESS_SLIPPED + 8, l)] = w * pzx, w * pzy, w * pzz
+        out[at(STIFFNESS_SLIPPED, l)], out[at(STIFFNESS_SLIPPED + 1, l)], out[at(STIFFNESS_SLIPPED + 2, l)] = (
+            w * pxx,
+            w * pxy,
+            w * pxz,
+        )
+        out[at(STIFFNESS_SLIPPED + 3, l)], out[at(STIFFNESS_SLIPPED + 4, l)], out[at(STIFFNESS_SLIPPED + 5, l)] = (
+            w * pyx,
+            w * pyy,
+            w * pyz,
+        )
+        out[at(STIFFNESS_SLIPPED + 6, l)], out[at(STIFFNESS_SLIPPED + 7, l)], out[at(STIFFNESS_SLIPPED + 8, l)] = (
+            w * pzx,
+            w * pzy,
+            w * pzz,
+        )
         out[at(BARE, l)], out[at(BARE + 1, l)], out[at(BARE + 2, l)] = weight * sx, weight * sy, weight * sz
-        out[at(BARE_SLIPPED, l)], out[at(BARE_SLIPPED + 1, l)], out[at(BARE_SLIPPED + 2, l)] = weight * px, weight * py, weight * pz
+        out[at(BARE_SLIPPED, l)], out[at(BARE_SLIPPED + 1, l)], out[at(BARE_SLIPPED + 2, l)] = (
+            weight * px,
+            weight * py,
+            weight * pz,
+        )
 
 
 @kernel

@@ -1,7 +1,8 @@
 """How the end of one sub-step depends on the whole strain increment, through where the sub-step began.
 
 The tangent of an increment that was cut into sub-steps is the chain of their derivatives. Each lane carries
-d(σ, F, e)/dΔε, dZ/dΔε and dλ_a/dΔε of the start of its current sub-step (six columns each); `carried` turns them into the
+d(σ, F, e)/dΔε, dZ/dΔε and dλ_a/dΔε of the start of its current sub-step (six columns each); `carried` turns them into
+the
 right-hand side of the sub-step's linear system, `advance` moves them to its end. Plain loops over one lane: only
 points that needed more than one sub-step pass here.
 """
@@ -12,8 +13,25 @@ from ..lanes import kernel, spot
 from .balance import HALF_SQRT2, contact_density, critical_void_ratio, inverse_fabric
 from .contact import TINY
 from .rows import (
-    BY_FABRIC, BY_VOID, DILATANCY, FABRIC_MIDDLE, FORCE, FORCE_OLD, FRICTION, GEO, INVERSE, LAW_INPUTS, LAW_SLOPE, OLD,
-    PLASTIC_GEO, PSI_P, RATIO_OLD, SCALED, SHARE, VOID, Y,
+    BY_FABRIC,
+    BY_VOID,
+    DILATANCY,
+    FABRIC_MIDDLE,
+    FORCE,
+    FORCE_OLD,
+    FRICTION,
+    GEO,
+    INVERSE,
+    LAW_INPUTS,
+    LAW_SLOPE,
+    OLD,
+    PLASTIC_GEO,
+    PSI_P,
+    RATIO_OLD,
+    SCALED,
+    SHARE,
+    VOID,
+    Y,
 )  # fmt: skip
 
 
@@ -91,9 +109,9 @@ def force_change(rows, change, total, l, sign, out, small):
 def plane_change(rows, done, elastic, n, l, small):
     """Return the slip of one contact plane and dλ/dtanφ_p; fill the derivatives of its displacement.
 
-    small: scratch; its matrices 4, 5, 6 become the derivatives of the displacement by the old and the new force, and of the
-    plastic one by the old force; the rows of 7 hold the old and the new force and become, in 8, the direction of slip (zero
-    where nothing slides) and dλ/df.
+    small: scratch; its matrices 4, 5, 6 become the derivatives of the displacement by the old and the new force, and of
+    the plastic one by the old force; the rows of 7 hold the old and the new force, those of 8 become the direction of
+    slip (zero where nothing slides) and dλ/df.
     """
     of_old, of_new, of_plastic = small[4], small[5], small[6]
     by_old, by_new, of_slide, q = small[7, 0], small[7, 1], small[8, 0], small[8, 1]
@@ -143,7 +161,7 @@ def plane_change(rows, done, elastic, n, l, small):
 
 @kernel
 def carried(rows, slide, base, rule, constants, change, dz, dslide, out, small, long, l):
-    """Fill dε and dε^p (12, 6) through the start of the sub-step, at fixed end: `change` (13, 6), dz (9, 6), dslide (N, 6)."""
+    """Fill dε and dε^p (12, 6) through the start of the sub-step: `change` (13, 6), dz (9, 6), dslide (N, 6)."""
     normals, weights, _ = rule
     elastic, line, tan_mu = constants.elastic, constants.line, constants.tan_mu
     total, evolving = constants.total, constants.evolving
@@ -197,7 +215,12 @@ def start_force(rows, total, l):
     a, b, c = rows[spot(OLD, l)], rows[spot(OLD + 1, l)], rows[spot(OLD + 2, l)]
     d, e, f = h * rows[spot(OLD + 3, l)], h * rows[spot(OLD + 4, l)], h * rows[spot(OLD + 5, l)]
     ga, gb, gc, gd, ge, gf = inverse_fabric(
-        rows[spot(OLD + 6, l)], rows[spot(OLD + 7, l)], rows[spot(OLD + 8, l)], h * rows[spot(OLD + 9, l)], h * rows[spot(OLD + 10, l)], h * rows[spot(OLD + 11, l)]
+        rows[spot(OLD + 6, l)],
+        rows[spot(OLD + 7, l)],
+        rows[spot(OLD + 8, l)],
+        h * rows[spot(OLD + 9, l)],
+        h * rows[spot(OLD + 10, l)],
+        h * rows[spot(OLD + 11, l)],
     )
     scale = 1.0 / contact_density(rows[spot(OLD + 12, l)])[0]
     entries = (a * ga + f * gf + e * ge, a * gf + f * gb + e * gd, a * ge + f * gd + e * gc,
@@ -210,8 +233,16 @@ def start_force(rows, total, l):
 @kernel
 def density(rows, n, l):
     """Return 1 + F_m : n n."""
-    cross = rows[spot(FABRIC_MIDDLE + 3, l)] * n[1] * n[2] + rows[spot(FABRIC_MIDDLE + 4, l)] * n[0] * n[2] + rows[spot(FABRIC_MIDDLE + 5, l)] * n[0] * n[1]
-    straight = rows[spot(FABRIC_MIDDLE, l)] * n[0] ** 2 + rows[spot(FABRIC_MIDDLE + 1, l)] * n[1] ** 2 + rows[spot(FABRIC_MIDDLE + 2, l)] * n[2] ** 2
+    cross = (
+        rows[spot(FABRIC_MIDDLE + 3, l)] * n[1] * n[2]
+        + rows[spot(FABRIC_MIDDLE + 4, l)] * n[0] * n[2]
+        + rows[spot(FABRIC_MIDDLE + 5, l)] * n[0] * n[1]
+    )
+    straight = (
+        rows[spot(FABRIC_MIDDLE, l)] * n[0] ** 2
+        + rows[spot(FABRIC_MIDDLE + 1, l)] * n[1] ** 2
+        + rows[spot(FABRIC_MIDDLE + 2, l)] * n[2] ** 2
+    )
     return 1.0 + straight + 2.0 * cross
 
 
@@ -256,7 +287,9 @@ def law_carried(rows, change, strain_change, out, ratio, l):
             dp = (change[0, c] + change[1, c] + change[2, c]) / 3.0
             total = rows[spot(row + 12, l)] * 0.5 * (change[12, c] - rows[spot(PSI_P, l)] * dp)
             for k in range(6):
-                total += 0.5 * rows[spot(row + k, l)] * change[6 + k, c] + 0.5 * rows[spot(row + 6 + k, l)] * change[k, c]
+                total += (
+                    0.5 * rows[spot(row + k, l)] * change[6 + k, c] + 0.5 * rows[spot(row + 6 + k, l)] * change[k, c]
+                )
                 total += rows[spot(row + 25 + k, l)] * strain_change[6 + k, c]
                 if ratio:
                     total -= rows[spot(RATIO_OLD + 6 * i + k, l)] * change[k, c]

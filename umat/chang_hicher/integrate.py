@@ -20,17 +20,64 @@ import numpy as np
 
 from .. import status
 from ..fabric.law import active_inputs, increments
-from ..lanes import LANES, kernel, spot
+from ..lanes import LANES, entry, kernel, spot
 from .balance import FLOOR, contact_density, critical_void_ratio, friction_columns, geometry, strain_and_slope
 from .contact import sum_planes
 from .elimination import factorise, solve
 from .history import advance, assign, carried, clear, density, law_carried, start_force
 from .residual import FABRIC_WEIGHT, by_ratio, error_norms, fabric_rows, gather, law_inputs, norms, right_hand_sides
 from .rows import (
-    ACCEPTED, BEST, BY_VOID_STRAIN, CLOSING, D, D_SLIPPED, ERROR, ERRORS, DRIVE, DRIVE_START, FABRIC, FABRIC_ERROR, FACTOR, FORCE, FORCE_OLD,
-    FRACTION, FULL, GAIN_END, GEO, H, H_SLIPPED, HIGH, INPUTS, LAW_INPUTS, LENGTH, LOW, MARGIN, MATRIX, MISSING, NEWTON, NORM, OLD, PART,
-    PLASTIC, PLASTIC_GEO, PLASTIC_SLOPE, PORTION, RATIO_OLD, ROWS, SHARE, SLOPE, STEP, STRAIN, STRESS_ERROR, STRESS_NORM, T,
-    T_SLIPPED, TANGENT, VOID, VOID_START, Y,
+    ACCEPTED,
+    BEST,
+    BY_VOID_STRAIN,
+    CLOSING,
+    D_SLIPPED,
+    DRIVE,
+    DRIVE_START,
+    ERROR,
+    ERRORS,
+    FABRIC,
+    FABRIC_ERROR,
+    FACTOR,
+    FORCE,
+    FORCE_OLD,
+    FRACTION,
+    FULL,
+    GAIN_END,
+    GEO,
+    H_SLIPPED,
+    HIGH,
+    INPUTS,
+    LAW_INPUTS,
+    LENGTH,
+    LOW,
+    MARGIN,
+    MATRIX,
+    MISSING,
+    NEWTON,
+    NORM,
+    OLD,
+    PART,
+    PLASTIC,
+    PLASTIC_GEO,
+    PLASTIC_SLOPE,
+    PORTION,
+    RATIO_OLD,
+    ROWS,
+    SHARE,
+    SLOPE,
+    STEP,
+    STRAIN,
+    STRESS_ERROR,
+    STRESS_NORM,
+    T_SLIPPED,
+    TANGENT,
+    VOID,
+    VOID_START,
+    D,
+    H,
+    T,
+    Y,
 )  # fmt: skip
 
 NEWTON_TOLERANCE = 1e-9  #: of the residual strain, relative to the sub-step
@@ -55,12 +102,24 @@ def evaluate(law, constants, rule, terms, pool, width):
     rows, total, evolving = pool.rows, constants.total, constants.evolving
     geometry(rows, constants.line, constants.tan_mu, total, width)
     sum_planes(
-        rows, pool.slide, pool.base, pool.buffer, rule, terms.always, terms.evolving, constants.elastic, total, evolving, width
+        rows,
+        pool.slide,
+        pool.base,
+        pool.buffer,
+        rule,
+        terms.always,
+        terms.evolving,
+        constants.elastic,
+        total,
+        evolving,
+        width,
     )
     friction_columns(rows, width)
     strain_and_slope(rows, D, H, T, STRAIN, SLOPE, GEO, total, evolving, width)
     if evolving:
-        strain_and_slope(rows, D_SLIPPED, H_SLIPPED, T_SLIPPED, PLASTIC, PLASTIC_SLOPE, PLASTIC_GEO, total, evolving, width)
+        strain_and_slope(
+            rows, D_SLIPPED, H_SLIPPED, T_SLIPPED, PLASTIC, PLASTIC_SLOPE, PLASTIC_GEO, total, evolving, width
+        )
         law_inputs(rows, 0.5, width)
         fabric_rows(law, rows, width)
     gather(rows, terms.components, evolving, width)
@@ -82,8 +141,8 @@ def begin(pool, l):
     rows[spot(BY_VOID_STRAIN, l)] = -specific * (fraction + portion)
     rows[spot(FACTOR, l)] = 1.0
     rows[spot(BEST, l)] = np.inf
-    pool.count[ITERATIONS, l] = 0
-    pool.count[TRIES, l] = 0
+    pool.counts[ITERATIONS, l] = 0
+    pool.counts[TRIES, l] = 0
 
 
 @kernel
@@ -122,7 +181,7 @@ def search(pool, inside, l):
         share = min(max(start / (start - now), 0.1), 0.5)
     rows[spot(HIGH, l)] = factor
     rows[spot(FACTOR, l)] = low + share * (factor - low)
-    pool.count[TRIES, l] += 1
+    pool.counts[TRIES, l] += 1
     place_trial(rows, l)
     return False
 
@@ -130,7 +189,7 @@ def search(pool, inside, l):
 @kernel
 def judge(pool, l):
     """Return what a lane does with the state just evaluated."""
-    rows, count = pool.rows, pool.count
+    rows, count = pool.rows, pool.counts
     count[EVALUATIONS, l] += 1
     norm, best, length = rows[spot(NORM, l)], rows[spot(BEST, l)], rows[spot(LENGTH, l)]
     inside = rows[spot(MARGIN, l)] > 0.0 and np.isfinite(norm)
@@ -227,7 +286,7 @@ def next_substep(constants, rule, pool, error, l):
 def reason(constants, rule, pool, l):
     """Return the status code of a point that cannot go on."""
     rows = pool.rows
-    if pool.count[EVALUATIONS, l] >= constants.max_evaluations:
+    if pool.counts[EVALUATIONS, l] >= constants.max_evaluations:
         return status.WORK_LIMIT
     p = (rows[spot(OLD, l)] + rows[spot(OLD + 1, l)] + rows[spot(OLD + 2, l)]) / 3.0
     if critical_void_ratio(p, constants.line)[0] < 1.5 * FLOOR:
@@ -250,7 +309,7 @@ def cut(constants, rule, pool, out, factor, lost, l):
         rows[spot(SHARE, l)] *= 0.25
     else:
         rows[spot(PORTION, l)] *= factor
-    if rows[spot(PORTION, l)] >= SMALLEST and pool.count[EVALUATIONS, l] < constants.max_evaluations:
+    if rows[spot(PORTION, l)] >= SMALLEST and pool.counts[EVALUATIONS, l] < constants.max_evaluations:
         begin(pool, l)
         return False
     p = (rows[spot(OLD, l)] + rows[spot(OLD + 1, l)] + rows[spot(OLD + 2, l)]) / 3.0
@@ -267,8 +326,8 @@ def load(constants, rule, pool, data, out, point, l):
     stress, fabric, void_ratio, slip, force, gap, strain = data
     rows = pool.rows
     for k in range(6):
-        pool.count[k, l] = 0
-    pool.count[POINT, l] = point
+        pool.counts[k, l] = 0
+    pool.counts[POINT, l] = point
     total, volume = void_ratio[point] + gap[point], strain[point, 0] + strain[point, 1] + strain[point, 2]
     closing = min(gap[point] / volume, 1.0) if volume > 0.0 else (1.0 if gap[point] > 0.0 else 0.0)
     for i in range(6):
@@ -303,9 +362,9 @@ def load(constants, rule, pool, data, out, point, l):
 @kernel
 def report(pool, out, code, l):
     """Write a point's status and the work spent on it; return False."""
-    point = pool.count[POINT, l]
+    point = pool.counts[POINT, l]
     out[7][point], out[8][point] = code, pool.rows[spot(ERROR, l)]
-    out[9][point], out[10][point] = pool.count[EVALUATIONS, l], pool.count[SUBSTEPS, l]
+    out[9][point], out[10][point] = pool.counts[EVALUATIONS, l], pool.counts[SUBSTEPS, l]
     return False
 
 
@@ -330,7 +389,7 @@ def open_point(constants, rule, pool, out, l):
     sub-step began, and the volumetric strain left is the gap.
     """
     stress, fabric, void_ratio, slip, force, gap, tangent = out[:7]
-    rows, point = pool.rows, pool.count[POINT, l]
+    rows, point = pool.rows, pool.counts[POINT, l]
     p, volume = constants.open_pressure, rows[spot(FULL, l)] + rows[spot(FULL + 1, l)] + rows[spot(FULL + 2, l)]
     for i in range(6):
         fabric[point, i] = rows[spot(OLD + FABRIC + i, l)]
@@ -351,7 +410,7 @@ def finish(constants, rule, pool, strain, out, l):
     """Write a point's answer."""
     stress, fabric, void_ratio, slip, force, gap, tangent = out[:7]
     rows, count = pool.rows, rule.weights.shape[0]
-    point, closing, new = pool.count[POINT, l], rows[spot(CLOSING, l)], pool.new_change
+    point, closing, new = pool.counts[POINT, l], rows[spot(CLOSING, l)], pool.new_change
     volume = strain[point, 0] + strain[point, 1] + strain[point, 2]
     for i in range(6):
         stress[point, i], fabric[point, i] = rows[spot(Y + i, l)], rows[spot(Y + FABRIC + i, l)]
@@ -378,11 +437,11 @@ def finish(constants, rule, pool, strain, out, l):
 @kernel
 def fill(constants, rule, pool, data, out, following, stop, l):
     """Give a lane the next point that can be tried; return the number of the point after it."""
-    pool.count[CODE, l] = IDLE
+    pool.counts[CODE, l] = IDLE
     while following < stop:
         following += 1
         if load(constants, rule, pool, data, out, following - 1, l):
-            pool.count[CODE, l] = TRIAL
+            pool.counts[CODE, l] = TRIAL
             break
     return following
 
@@ -411,9 +470,9 @@ def take_step(pool, components, evolving, l):
 def settle(constants, components, rule, pool, strain, out, l):
     """Act on a lane's solved system; return True when its point is finished, one way or the other."""
     rows = pool.rows
-    if pool.count[CODE, l] == ITERATE and take_step(pool, components, constants.evolving, l):
+    if pool.counts[CODE, l] == ITERATE and take_step(pool, components, constants.evolving, l):
         return False
-    if pool.count[CODE, l] != EQUILIBRIUM:
+    if pool.counts[CODE, l] != EQUILIBRIUM:
         return cut(constants, rule, pool, out, 0.25, True, l)
     if rows[spot(Y, l)] + rows[spot(Y + 1, l)] + rows[spot(Y + 2, l)] < 3.0 * constants.open_pressure:
         open_point(constants, rule, pool, out, l)
@@ -426,7 +485,7 @@ def settle(constants, components, rule, pool, strain, out, l):
     if not error <= constants.tolerance and rows[spot(PORTION, l)] * factor >= SMALLEST and not relaxed:
         return cut(constants, rule, pool, out, factor, False, l)
     rows[spot(ERROR, l)] += error
-    pool.count[SUBSTEPS, l] += 1
+    pool.counts[SUBSTEPS, l] += 1
     collect(pool, components, constants.evolving, l)
     if rows[spot(FRACTION, l)] + rows[spot(PORTION, l)] >= 1.0:
         finish(constants, rule, pool, strain, out, l)
@@ -451,7 +510,7 @@ def solve_lanes(law, constants, rule, components, pool, equilibrium, width):
             by_ratio(rows, OLD, RATIO_OLD, width)
     right_hand_sides(rows, components, evolving, width)
     for l in range(width):
-        if pool.count[CODE, l] == EQUILIBRIUM and rows[spot(FRACTION, l)] > 0.0:
+        if pool.counts[CODE, l] == EQUILIBRIUM and rows[spot(FRACTION, l)] > 0.0:
             through_start(law, constants, rule, components, pool, l)
     solve(rows, MATRIX, TANGENT, n, 6, width)
     solve(rows, MATRIX, ERRORS, n, 1, width)
@@ -471,13 +530,13 @@ def move(pool, source, target):
     assign(pool.dz[target], pool.dz[source])
     assign(pool.dslide[target], pool.dslide[source])
     for k in range(6):
-        pool.count[k, target] = pool.count[k, source]
+        pool.counts[k, target] = pool.counts[k, source]
 
 
-@kernel
+@entry
 def integrate(law, constants, rule, terms, pool, data, out, start, stop):
     """Integrate the points start…stop-1; see the module's docstring."""
-    components, count = terms.components, pool.count
+    components, count = terms.components, pool.counts
     following, held = start, 0
     while held < LANES and following < stop:
         following = fill(constants, rule, pool, data, out, following, stop, held)

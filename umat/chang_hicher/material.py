@@ -53,7 +53,7 @@ class ChangHicherState(NamedTuple):
     slip: Array
     """(n, N) accumulated sliding over the grain diameter (δ_t^p / 2r) [-]."""
     force: Array
-    """(n, N, 3) contact forces over p_ref r² in the rate form, (n, 0, 3) in the total form, which has no use for them."""
+    """(n, N, 3) contact forces over p_ref r² in the rate form; (n, 0, 3) in the total form, which needs none."""
     gap: Array
     """(n,) volumetric strain by which an open point must be compressed before its contacts close [-], positive."""
 
@@ -93,7 +93,9 @@ def rule_of(directions: Directions) -> Rule:
     return _RULES[directions]
 
 
-def contact_forces(material: ChangHicher, directions: Directions, stress: Array, fabric: Array, void_ratio: Array) -> Array:
+def contact_forces(
+    material: ChangHicher, directions: Directions, stress: Array, fabric: Array, void_ratio: Array
+) -> Array:
     """Return f = σ G⁻¹ n / c(e), (n, N, 3), force over p_ref r² [ZK Table 3, total form]."""
     inverse = np.linalg.inv(np.eye(3) / 3.0 + 2.0 / 15.0 * to_tensor(fabric))
     density = 3.0 / (2.0 * np.pi) * (13.28 - 8.0 * void_ratio) / (1.0 + void_ratio)
@@ -117,7 +119,7 @@ def critical_void_ratio(material: ChangHicher, p: ArrayLike) -> Array:
 def start(
     material: ChangHicher, directions: Directions, stress: ArrayLike, *, void_ratio: ArrayLike, fabric: ArrayLike = 0.0
 ) -> ChangHicherState:
-    """Return the state at the start of a path: the sliding already done is what the forces need, so nothing slips at rest.
+    """Return the state at the start of a path: the sliding done is what the forces need, so nothing slips at rest.
 
     stress: (n, 6); void_ratio: () or (n,); fabric: (6,) or (n, 6) Mandel components of F.
     Raises ValueError if a stress lies outside the domain of the contact law, or E(n) = 1 + F:nn is not positive.
@@ -137,11 +139,15 @@ def start(
     critical = critical_void_ratio(material, mean(stress))
     limit = (critical / void_ratio * constants.tan_mu)[:, None]
     if not (np.all(normal > 0.0) and np.all(ratio < limit)):
-        raise ValueError("the stress lies outside the domain of the contact law: some contact would pull or slide freely")
+        raise ValueError(
+            "the stress lies outside the domain of the contact law: some contact would pull or slide freely"
+        )
     compliance, _, ease_p = constants.elastic
     slip = ease_p * compliance * np.sqrt(normal) * limit * ratio / (limit - ratio)
     kept = force if not constants.total else np.zeros((n, 0, 3))
-    return ChangHicherState(stress, fabric, void_ratio, np.ascontiguousarray(slip), np.ascontiguousarray(kept), np.zeros(n))
+    return ChangHicherState(
+        stress, fabric, void_ratio, np.ascontiguousarray(slip), np.ascontiguousarray(kept), np.zeros(n)
+    )
 
 
 def fields(material: ChangHicher, state: ChangHicherState) -> dict[str, Array]:
@@ -159,14 +165,17 @@ def fields(material: ChangHicher, state: ChangHicherState) -> dict[str, Array]:
         "fabric": state.fabric,
         "fabric_norm": norm(state.fabric),
         "anisotropy": dot(state.fabric, s) / np.maximum(norm(s), floor),
-        "mobilised_friction": np.degrees(np.arcsin(np.clip((major - minor) / np.maximum(major + minor, floor), 0.0, 1.0))),
+        "mobilised_friction": np.degrees(
+            np.arcsin(np.clip((major - minor) / np.maximum(major + minor, floor), 0.0, 1.0))
+        ),
     }
 
 
 def elastic(material: ChangHicher, state: ChangHicherState) -> Array:
     """Return the (n, 6, 6) elastic tangent of an isotropic packing at the state's pressure and void ratio.
 
-    With F = 0, f = (3/c) σ n and ⟨n_i n_j n_k n_l⟩ = (δ_ij δ_kl + δ_ik δ_jl + δ_il δ_jk)/15 the averages of [ZK Table 3] close:
+    With F = 0, f = (3/c) σ n and ⟨n_i n_j n_k n_l⟩ = (δ_ij δ_kl + δ_ik δ_jl + δ_il δ_jk)/15 the averages of [ZK
+    Table 3] close:
     ε = (9/c) [(C_n − C_t) (tr σ I + 2σ)/15 + C_t σ/3], C_n = compliance / (2 √f_n), C_t = C_n / k_tR.
     """
     constants = constants_of(material)

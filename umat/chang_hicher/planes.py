@@ -8,7 +8,7 @@ Storage: a pair (i, k) is row 3 i + k, a symmetric pair row `PAIR`, a symmetric 
 
 from functools import lru_cache
 from itertools import product
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,8 +16,25 @@ from numpy.typing import NDArray
 from ..directions import Directions
 from .contact import GROUP
 from .rows import (
-    BARE, BARE_SLIPPED, BY_DILATANCY, BY_FRICTION, D, D_DILATANCY, D_FRICTION, D_LATE, D_SLIPPED, DISPLACEMENT, H,
-    H_SLIPPED, LATE, SLIPPED, STIFFNESS, STIFFNESS_SLIPPED, T, T_SLIPPED, WASTE,
+    BARE,
+    BARE_SLIPPED,
+    BY_DILATANCY,
+    BY_FRICTION,
+    D_DILATANCY,
+    D_FRICTION,
+    D_LATE,
+    D_SLIPPED,
+    DISPLACEMENT,
+    H_SLIPPED,
+    LATE,
+    SLIPPED,
+    STIFFNESS,
+    STIFFNESS_SLIPPED,
+    T_SLIPPED,
+    WASTE,
+    D,
+    H,
+    T,
 )  # fmt: skip
 
 AXES = range(3)
@@ -62,8 +79,8 @@ def terms(mirrored: bool) -> Terms:
     return Terms(_in_threes(always), _in_threes(evolving), components)
 
 
-def _in_threes(terms: list[tuple[int, int, int]]) -> NDArray[np.int64]:
-    """Return the terms (out row, buffer row, column) with up to three that share a buffer row in one; the rest go to waste."""
+def _in_threes(terms: list[tuple[Any, Any, Any]]) -> NDArray[np.int64]:
+    """Return the terms (out row, buffer row, column) three in a row that share a buffer row, filled up with waste."""
     table = []
     for row in sorted({term[1] for term in terms}):
         of_row = [(out, column) for out, buffer, column in terms if buffer == row]

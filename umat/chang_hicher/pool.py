@@ -42,18 +42,18 @@ class Pool(NamedTuple):
     new_change: Array
     small: Array  #: scratch, (10, 3, 3)
     long: Array  #: scratch, (28, 6)
-    count: NDArray[np.int64]  #: (6, LANES) point, evaluations, sub-steps, iterations, tries, code
+    counts: NDArray[np.int64]  #: (6, LANES) point, evaluations, sub-steps, iterations, tries, code
 
 
 def make_pool(n_directions: int, total: bool) -> Pool:
     """Return storage for `n_directions` padded directions, every lane at a harmless state."""
     n = n_directions
     pool = Pool(
-        rows=rows(ROWS), slide=rows(2 * n), base=rows(3 if total else 3 * n), buffer=rows(GROUP * BUFFER),
+        rows=rows(int(ROWS)), slide=rows(2 * n), base=rows(3 if total else 3 * n), buffer=rows(GROUP * BUFFER),
         change=np.zeros((LANES, 13, 6)), dz=np.zeros((LANES, 9, 6)), dslide=np.zeros((LANES, n, 6)),
         carried=np.zeros((12, 6)), carried_fabric=np.zeros((6, 6)), new_change=np.zeros((13, 6)),
         small=np.zeros((10, 3, 3)), long=np.zeros((28, 6)),
-        count=np.zeros((6, LANES), np.int64),
+        counts=np.zeros((6, LANES), np.int64),
     )  # fmt: skip
     by_row = pool.rows.reshape(ROWS, LANES)
     by_row[SHARE] = 1.0

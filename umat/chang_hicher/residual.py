@@ -9,9 +9,42 @@ import numpy as np
 from ..fabric.law import active_inputs, increments, six, slope_of
 from ..lanes import LANES, at, kernel, lanes
 from .rows import (
-    BY_VOID_STRAIN, COLUMNS, DRIVE, ERRORS, FABRIC, FABRIC_ERROR, FABRIC_SLOPE, FIRST, GAIN, GAIN_END, GEO, INPUTS,
-    LAW_INPUTS, LAW_SLOPE, LENGTH, MATRIX, MISSING, NEWTON, NORM, OLD, PART, PLASTIC, PLASTIC_SLOPE, PORTION, PSI,
-    PSI_P, RATIO_SLOPE, SHARE, SLOPE, STEP, STRAIN, STRESS_ERROR, STRESS_NORM, TANGENT, VOID, Y,
+    BY_VOID_STRAIN,
+    COLUMNS,
+    DRIVE,
+    ERRORS,
+    FABRIC,
+    FABRIC_ERROR,
+    FABRIC_SLOPE,
+    FIRST,
+    GAIN,
+    GAIN_END,
+    GEO,
+    INPUTS,
+    LAW_INPUTS,
+    LAW_SLOPE,
+    LENGTH,
+    MATRIX,
+    MISSING,
+    NEWTON,
+    NORM,
+    OLD,
+    PART,
+    PLASTIC,
+    PLASTIC_SLOPE,
+    PORTION,
+    PSI,
+    PSI_P,
+    RATIO_SLOPE,
+    SHARE,
+    SLOPE,
+    STEP,
+    STRAIN,
+    STRESS_ERROR,
+    STRESS_NORM,
+    TANGENT,
+    VOID,
+    Y,
 )  # fmt: skip
 
 FABRIC_WEIGHT = 0.1  #: of the fabric residual beside the strain residual
@@ -127,8 +160,8 @@ def norms(rows, components, evolving, width):
     """Fill the norm of the residual as a strain, of the sub-step's strain, and minus the residual along the step.
 
     The latter, Σ (Δε − ε)·dσ with a share of the fabric equations, is what the line search wants small: strain grows
-    monotonically with stress, with a kink where a contact begins to slide, and the norm of the residual may have to rise
-    on the way across kinks.
+    monotonically with stress, with a kink where a contact begins to slide, and the norm of the residual may have to
+    rise on the way across kinks.
     """
     nc = components.shape[0]
     for l in lanes(width):

@@ -6,6 +6,8 @@ Symmetric tensors take six rows: xx, yy, zz, yz, xz, xy, in Mandel components un
 
 from itertools import accumulate
 
+import numpy as np
+
 _COUNTS = {
     # what one contact plane reads
     "FORCE": 9,  # Z at the end of the step, f = Z n (+ base)
@@ -82,7 +84,8 @@ _COUNTS = {
     "BY_VOID_STRAIN": 1,  # de/dε_v of the end of the sub-step
 }
 
-_STARTS = dict(zip(_COUNTS, accumulate([0, *_COUNTS.values()]), strict=False))
+# numpy integers: the compiler would make a version of every function for each value of a Python integer
+_STARTS = {name: np.int64(row) for name, row in zip(_COUNTS, accumulate([0, *_COUNTS.values()]), strict=False)}
 ROWS = sum(_COUNTS.values())
 
 FORCE, FORCE_OLD, FRICTION, DILATANCY = (_STARTS[k] for k in ("FORCE", "FORCE_OLD", "FRICTION", "DILATANCY"))
@@ -109,13 +112,13 @@ FRACTION, PORTION, FACTOR, BEST, ERROR, VOID_START, CLOSING, BY_VOID_STRAIN = (
 )
 
 #: columns of a slope: six stresses, six fabric components, the void ratio; and where those start
-COLUMNS, FABRIC, VOID = 13, 6, 12
+COLUMNS, FABRIC, VOID = np.int64(13), np.int64(6), np.int64(12)
 #: inputs of a fabric law
-LAW_INPUTS = 31
+LAW_INPUTS = np.int64(31)
 
 # the buffer of one direction (each quantity times its weight)
-DISPLACEMENT, SLIPPED, LATE, BY_FRICTION, BY_DILATANCY = 0, 3, 6, 9, 12
-STIFFNESS, STIFFNESS_SLIPPED, BARE, BARE_SLIPPED, BUFFER = 13, 22, 31, 34, 37
+DISPLACEMENT, SLIPPED, LATE, BY_FRICTION, BY_DILATANCY = (np.int64(k) for k in (0, 3, 6, 9, 12))
+STIFFNESS, STIFFNESS_SLIPPED, BARE, BARE_SLIPPED, BUFFER = (np.int64(k) for k in (13, 22, 31, 34, 37))
 
 # the sums over directions, from SUMS on
 D, D_SLIPPED, D_LATE, D_FRICTION, D_DILATANCY = SUMS, SUMS + 9, SUMS + 18, SUMS + 27, SUMS + 36

@@ -19,13 +19,19 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 from numba.extending import overload
 
-from ..lanes import COMPILED, at, kernel, lanes
+from ..lanes import COMPILED, at, entry, kernel, lanes
 
 #: place of each argument among the inputs of a law, and their number
-SPAN = {"fabric": (0, 6), "stress": (6, 12), "state_parameter": (12, 13), "ratio": (13, 19), "strain": (19, 25), "plastic": (25, 31)}
+SPAN = {
+    "fabric": (0, 6),
+    "stress": (6, 12),
+    "state_parameter": (12, 13),
+    "ratio": (13, 19),
+    "strain": (19, 25),
+    "plastic": (25, 31),
+}
 INPUTS = 31
 STEP = 1e-100  #: of the complex step
 TINY = 1e-60  #: under a root, so that a direction without length is zero
@@ -35,13 +41,15 @@ SMALL = 1e-3  #: length of F and of s/p below which their Lode angle fades out
 class _Entry(NamedTuple):
     increment: Callable[..., Any]
     inputs: tuple[int, ...]
-    slope: Callable[..., Any] | None
+    slope: Any
 
 
 _LAWS: dict[type, _Entry] = {}
 
 
-def law(record: type, *arguments: str, slope: Callable[..., Any] | None = None) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+def law(
+    record: type, *arguments: str, slope: Callable[..., Any] | None = None
+) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
     """Register the decorated function for a record; `arguments` names what it reads."""
     inputs = tuple(k for name in SPAN if name in arguments for k in range(*SPAN[name]))
 
@@ -57,7 +65,9 @@ def known_laws() -> list[type]:
     return list(_LAWS)
 
 
-def fabric_increment(law: Any, fabric: Any, stress: Any, state_parameter: Any, ratio: Any, strain: Any, plastic: Any) -> Any:
+def fabric_increment(
+    law: Any, fabric: Any, stress: Any, state_parameter: Any, ratio: Any, strain: Any, plastic: Any
+) -> Any:
     """Return the increment of F, six components, of the law that the record belongs to."""
     return _LAWS[type(law)].increment(law, fabric, stress, state_parameter, ratio, strain, plastic)
 
@@ -108,7 +118,7 @@ def six(rows, first, l):
     )
 
 
-@njit
+@kernel
 def _shifted(values, first, k):
     """Return the tuple with an imaginary step in its entry k - first, if it has one."""
     a, b, c, d, e, f = values
@@ -123,7 +133,7 @@ def _shifted(values, first, k):
     )
 
 
-@kernel
+@entry
 def increments(law, inputs, out, width):
     """Fill six rows with the law's increments from the rows of its inputs (both flat)."""
     for l in lanes(width):
@@ -140,7 +150,7 @@ def increments(law, inputs, out, width):
         out[at(3, l)], out[at(4, l)], out[at(5, l)] = d, e, f
 
 
-@kernel
+@entry
 def complex_slope(law, inputs, slope, width):
     """Fill the derivative of any law by complex steps."""
     for k in active_inputs(law):
@@ -166,54 +176,53 @@ def complex_slope(law, inputs, slope, width):
 # --- tensors as 6-tuples, also complex -------------------------------------------------------------------------
 
 
-@njit
+@kernel
 def dot(a, b):
     """Return a : b."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3] + a[4] * b[4] + a[5] * b[5]
 
 
-@njit
+@kernel
 def scaled(k, a):
     """Return k a."""
     return (k * a[0], k * a[1], k * a[2], k * a[3], k * a[4], k * a[5])
 
 
-@njit
+@kernel
 def plus(a, b):
     """Return a + b."""
     return (a[0] + b[0], a[1] + b[1], a[2] + b[2], a[3] + b[3], a[4] + b[4], a[5] + b[5])
 
 
-@njit
+@kernel
 def deviator(a):
     """Return a - tr(a)/3 I."""
     m = (a[0] + a[1] + a[2]) / 3.0
     return (a[0] - m, a[1] - m, a[2] - m, a[3], a[4], a[5])
 
 
-@njit
+@kernel
 def length(a):
     """Return √(a : a)."""
     return np.sqrt(dot(a, a) + TINY)
 
 
-@njit
+@kernel
 def determinant(a):
     """Return det a of a tensor in Mandel components."""
-    return (
-        a[0] * a[1] * a[2]
-        + 0.5 * (2.0**0.5 * a[3] * a[4] * a[5] - a[0] * a[3] * a[3] - a[1] * a[4] * a[4] - a[2] * a[5] * a[5])
+    return a[0] * a[1] * a[2] + 0.5 * (
+        2.0**0.5 * a[3] * a[4] * a[5] - a[0] * a[3] * a[3] - a[1] * a[4] * a[4] - a[2] * a[5] * a[5]
     )
 
 
-@njit
+@kernel
 def cos3theta(a):
     """Return cos 3θ of a deviator, θ = 0 in compression; it fades to 0 where a is shorter than `SMALL`."""
     n2 = dot(a, a) + SMALL * SMALL
     return 3.0 * 6.0**0.5 * determinant(a) / (n2 * np.sqrt(n2))
 
 
-@njit
+@kernel
 def stress_ratio(stress):
     """Return the tensor s/p and q/p."""
     p = (stress[0] + stress[1] + stress[2]) / 3.0

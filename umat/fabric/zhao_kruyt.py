@@ -73,7 +73,7 @@ def _slope(law, inputs, slope, width):
                 slope[at(31 * i + k, l)] = hu * (kf * df[k] + kf2 * f[k] - x * n[k])
                 volumetric = pull if k < 3 else 0.0
                 slope[at(31 * i + 6 + k, l)] = kx * u[i] * law.m * (trend[k] - volumetric)
-                own = ((2.0 / 3.0 if i == k else -1.0 / 3.0) if i < 3 and k < 3 else (1.0 if i == k else 0.0))
+                own = (2.0 / 3.0 if i == k else -1.0 / 3.0) if i < 3 and k < 3 else (1.0 if i == k else 0.0)
                 slope[at(31 * i + 25 + k, l)] = b * own - law.h * x * n[i] * (f[k] - along * n[k])
             slope[at(31 * i + 12, l)] = kx * u[i]
 
