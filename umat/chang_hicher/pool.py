@@ -49,7 +49,7 @@ def make_pool(n_directions: int, total: bool) -> Pool:
     """Return storage for `n_directions` padded directions, every lane at a harmless state."""
     n = n_directions
     pool = Pool(
-        rows=rows(int(ROWS)), slide=rows(2 * n), base=rows(3 if total else 3 * n), buffer=rows(GROUP * BUFFER),
+        rows=rows(int(ROWS)), slide=rows(2 * n), base=rows(3 if total else 3 * n), buffer=rows(int(GROUP * BUFFER)),
         change=np.zeros((LANES, 13, 6)), dz=np.zeros((LANES, 9, 6)), dslide=np.zeros((LANES, n, 6)),
         carried=np.zeros((12, 6)), carried_fabric=np.zeros((6, 6)), new_change=np.zeros((13, 6)),
         small=np.zeros((10, 3, 3)), long=np.zeros((28, 6)),

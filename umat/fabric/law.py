@@ -8,9 +8,9 @@ A law is a record of parameters and one function, in one file:
 which returns the increment of the fabric anisotropy tensor F over a step, six Mandel components. Its
 arguments are 6-tuples (`state_parameter` a number): F and the stress at the middle of the step, the state
 parameter ψ there, and the increments of the stress ratio tensor s/p, of strain and of plastic strain. Stress may be
-in any unit: only ratios of it may be used. The function is plain arithmetic that also holds for complex numbers (no abs, no
-comparison but through `.real`), because its derivative is found by a complex step, exact to rounding. The names in
-the decorator say which arguments the law reads; the others cost nothing.
+in any unit: only ratios of it may be used. The function is plain arithmetic that also holds for complex numbers (no
+abs, no comparison but through `.real`), because its derivative is found by a complex step, exact to rounding. The
+names in the decorator say which arguments the law reads; the others cost nothing.
 
 A law that is used much may add its own derivative (see `zhao_kruyt`).
 """
