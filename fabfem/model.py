@@ -48,8 +48,15 @@ class Controls:
     rise : float
         How many times larger a correction may make the residual before it is halved. Newton often needs a step up;
         `docs/architecture.md` has what was tried.
+    turn : float
+        How much of the residual's work along a correction may be left when it is taken, whatever its sign; beyond, the
+        correction is shortened. It lets the norm rise across a kink, but no correction overshoot; infinity asks nothing.
     backtracks : int
-        Halvings of one correction, at most.
+        Times that one correction is shortened, at most.
+    viscosity : float
+        Stress that resists the rate of strain, over the elastic stress that the rate would make in one stage: what
+        softens or jumps then takes a finite part of the stage, and small increments are well posed. See
+        `docs/footing.md` for what it costs; every increment reports the share of the forces.
     extrapolate : bool
         Start from the last increment's displacement, where there is one in the stage, instead of a solve with the
         last tangent: a fifth to a quarter fewer solves.
@@ -60,7 +67,9 @@ class Controls:
     easy: int = 6
     growth: float = 1.5
     rise: float = 10.0
+    turn: float = 0.8
     backtracks: int = 4
+    viscosity: float = 0.0
     extrapolate: bool = True
 
 

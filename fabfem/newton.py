@@ -1,8 +1,12 @@
 """Equilibrium at the end of one increment: Newton with the consistent tangent.
 
-A correction that makes the residual rise too much is halved a few times; where that does not help, the elastic tangent
-is tried for one correction; then the increment is refused, with a sentence, and the caller makes it smaller. The first
-trial carries the last increment on, or comes from the tangent of the last equilibrium (elastic where a stage begins).
+A correction that overshoots or makes the residual rise too much is shortened a few times; where that does not help, the
+elastic tangent is tried for one correction; then the increment is refused, with a sentence, and the caller makes it
+smaller. The first trial carries the last increment on, or comes from the tangent of the last equilibrium (elastic where
+a stage begins).
+
+With viscosity η (see `Controls`) the points also carry the stress η/Δt D_e Δε, D_e the elastic tangent where the
+increment begins and Δt the increment's part of the stage. It is no part of the state; its nodal forces are the drag.
 """
 
 from collections.abc import Callable, Iterator, Mapping
@@ -61,9 +65,20 @@ class Equilibrium(NamedTuple):
     displacement: np.ndarray
     states: States
     force: np.ndarray
-    """(ndof,) internal force."""
+    """(ndof,) internal force, without drag."""
     tangent: np.ndarray
     """(npoints, 6, 6) what the first correction of the next increment uses."""
+
+
+class Task(NamedTuple):
+    """What an increment has to balance."""
+
+    load: np.ndarray
+    """(ndof,) external force at its end."""
+    motion: np.ndarray
+    """Displacement of the held dofs in it."""
+    viscous: np.ndarray | None
+    """(npoints, 6, 6) viscous stress by strain increment, where there is viscosity."""
 
 
 class Trial(NamedTuple):
@@ -73,6 +88,9 @@ class Trial(NamedTuple):
     """(ndof,) displacement since the last equilibrium."""
     batch: Batch
     force: np.ndarray
+    """(ndof,) internal force, drag included."""
+    drag: np.ndarray
+    """(ndof,) nodal forces of the viscous stress."""
     unbalanced: np.ndarray
     """Out-of-balance force on free dofs."""
     norm: float
@@ -91,17 +109,18 @@ class Solved(NamedTuple):
 
 
 def solve_increment(
-    system: System, old: Equilibrium, load: np.ndarray, motion: np.ndarray, guess: np.ndarray | None = None
+    system: System, old: Equilibrium, load: np.ndarray, size: float, guess: np.ndarray | None = None
 ) -> Solved:
-    """Equilibrium under `load` (ndof,) with the held dofs moved by `motion` from `old`.
+    """Equilibrium under `load` (ndof,) a part `size` of the stage after `old`.
 
     `guess` is a displacement increment to start from; without one a solve with the old tangent makes it.
     """
+    task = Task(load, size * system.constraints.motion, _viscous(system, old, size))
     residuals: list[float] = []
     iterations = 0
-    trial: Trial | Refusal = Refusal("") if guess is None else attempt(system, old, load, guess)
+    trial: Trial | Refusal = Refusal("") if guess is None else attempt(system, old, task, guess)
     if isinstance(trial, Refusal):
-        trial = _predicted(system, old, load, motion)
+        trial = _predicted(system, old, task)
         iterations += 1
     while isinstance(trial, Trial):
         residuals.append(trial.residual)
@@ -111,22 +130,35 @@ def solve_increment(
             reason = f"no equilibrium in {iterations} iterations (residual {trial.residual:.1e})"
             trial = Refusal(reason, _worst_point(system, trial))
             break
-        trial = _corrected(system, old, load, trial)
+        trial = _corrected(system, old, task, trial)
         iterations += 1
     return Solved(trial, iterations, tuple(residuals))
 
 
-def attempt(system: System, old: Equilibrium, load: np.ndarray, step: np.ndarray) -> Trial | Refusal:
+def _viscous(system: System, old: Equilibrium, size: float) -> np.ndarray | None:
+    eta = system.controls.viscosity
+    return eta / size * elastic_tangents(system.zones, old.states, system.space.npoints) if eta > 0.0 else None
+
+
+def attempt(system: System, old: Equilibrium, task: Task, step: np.ndarray) -> Trial | Refusal:
     """What a displacement increment leaves out of balance, or why the points refuse it."""
+    strain = system.space.strain(step)
     with system.clock.phase("material"):
-        batch = update_points(system.zones, system.space.strain(step), old.states)
+        batch = update_points(system.zones, strain, old.states)
     if isinstance(batch, Refusal):
         return batch
     with system.clock.phase("assembly"):
-        force = system.space.internal_force(batch.stress)
-    unbalanced = (load - force)[system.constraints.free]
+        drag = _drag(system, task, strain)
+        force = system.space.internal_force(batch.stress) + drag
+    unbalanced = (task.load - force)[system.constraints.free]
     size = norm(unbalanced)
-    return Trial(step, batch, force, unbalanced, size, relative(size, force, load))
+    return Trial(step, batch, force, drag, unbalanced, size, relative(size, force, task.load))
+
+
+def _drag(system: System, task: Task, strain: np.ndarray) -> np.ndarray:
+    if task.viscous is None:
+        return np.zeros(system.space.ndof)
+    return system.space.internal_force((task.viscous @ strain[:, :, None])[:, :, 0])
 
 
 def relative(size: float, force: np.ndarray, load: np.ndarray) -> float:
@@ -140,19 +172,19 @@ def _round_off(system: System, step: np.ndarray) -> float:
     return 1e-14 * system.stiffest * norm(step)
 
 
-def _predicted(system: System, old: Equilibrium, load: np.ndarray, motion: np.ndarray) -> Trial | Refusal:
+def _predicted(system: System, old: Equilibrium, task: Task) -> Trial | Refusal:
     """The trial that the old tangent leads to, or the elastic one where that fails."""
     return _first_that_works(
-        lambda tangent: _extended(system, old, load, motion, tangent),
+        lambda tangent: _extended(system, old, task, tangent),
         lambda: old.tangent,
         lambda: elastic_tangents(system.zones, old.states, system.space.npoints),
     )
 
 
-def _corrected(system: System, old: Equilibrium, load: np.ndarray, trial: Trial) -> Trial | Refusal:
+def _corrected(system: System, old: Equilibrium, task: Task, trial: Trial) -> Trial | Refusal:
     """The trial that a Newton correction leads to, or one with the elastic tangent where that fails."""
     return _first_that_works(
-        lambda tangent: _searched(system, old, load, trial, tangent),
+        lambda tangent: _searched(system, old, task, trial, tangent),
         lambda: trial.batch.tangent,
         lambda: elastic_tangents(system.zones, trial.batch.states, system.space.npoints),
     )
@@ -171,40 +203,62 @@ def _first_that_works(
     return refusals[0]
 
 
-def _extended(
-    system: System, old: Equilibrium, load: np.ndarray, motion: np.ndarray, tangent: np.ndarray
-) -> Trial | Refusal:
+def _extended(system: System, old: Equilibrium, task: Task, tangent: np.ndarray) -> Trial | Refusal:
     """The trial of one linear step from `old` to the new load and held dofs."""
     step = np.zeros(system.space.ndof)
-    step[system.constraints.held] = motion
-    matrix = _stiffness(system, tangent)
-    correction = _solved(system, matrix, (load - old.force - matrix @ step)[system.constraints.free])
+    step[system.constraints.held] = task.motion
+    matrix = _stiffness(system, task, tangent)
+    correction = _solved(system, matrix, (task.load - old.force - matrix @ step)[system.constraints.free])
     if isinstance(correction, Refusal):
         return correction
     step[system.constraints.free] = correction
-    return attempt(system, old, load, step)
+    return attempt(system, old, task, step)
 
 
-def _searched(system: System, old: Equilibrium, load: np.ndarray, trial: Trial, tangent: np.ndarray) -> Trial | Refusal:
-    """The trial of one correction, halved while the points refuse it or the residual rises too much."""
-    correction = _solved(system, _stiffness(system, tangent), trial.unbalanced)
+def _searched(system: System, old: Equilibrium, task: Task, trial: Trial, tangent: np.ndarray) -> Trial | Refusal:
+    """The trial of one correction, shortened while the points refuse it, it overshoots or the residual rises too much.
+
+    Where shortening does not end that, the trial with the smallest residual, unless it rises too much.
+    """
+    correction = _solved(system, _stiffness(system, task, tangent), trial.unbalanced)
     if isinstance(correction, Refusal):
         return correction
-    new: Trial | Refusal = Refusal("")
-    for halvings in range(system.controls.backtracks + 1):
+    start = float((correction * trial.unbalanced).sum())
+    tried: list[Trial | Refusal] = []
+    factor = 1.0
+    for _ in range(system.controls.backtracks + 1):
         step = trial.step.copy()
-        step[system.constraints.free] += 0.5**halvings * correction
-        new = attempt(system, old, load, step)
-        if isinstance(new, Trial) and new.norm < system.controls.rise * trial.norm:
+        step[system.constraints.free] += factor * correction
+        new = attempt(system, old, task, step)
+        tried.append(new)
+        left = float((correction * new.unbalanced).sum()) if isinstance(new, Trial) else 0.0
+        if isinstance(new, Trial) and _content(system.controls, new.norm / trial.norm, start, left):
             return new
-    if isinstance(new, Refusal):
-        return new
+        factor *= float(np.clip(start / (start - left), 0.1, 0.5)) if left < 0.0 < start else 0.5
+    return _least(system, trial, tried)
+
+
+def _content(controls: Controls, rise: float, start: float, left: float) -> bool:
+    """Whether a correction is taken: `start` and `left` are the residual's work along it before and after."""
+    straight = abs(left) <= controls.turn * abs(start) if start > 0.0 else rise < 1.0
+    return rise <= 0.5 or (rise < controls.rise and (straight or controls.turn == np.inf))
+
+
+def _least(system: System, trial: Trial, tried: list[Trial | Refusal]) -> Trial | Refusal:
+    """The trial with the smallest residual, or the refusal that stands in the way."""
+    trials = [new for new in tried if isinstance(new, Trial)]
+    if not trials:
+        return tried[-1]
+    best = min(trials, key=lambda new: new.norm)
+    if best.norm < system.controls.rise * trial.norm:
+        return best
     return Refusal(f"every correction makes the residual {trial.residual:.1e} rise", _worst_point(system, trial))
 
 
-def _stiffness(system: System, tangent: np.ndarray) -> csr_matrix:
+def _stiffness(system: System, task: Task, tangent: np.ndarray) -> csr_matrix:
     with system.clock.phase("assembly"):
-        return stiffness(system.space, system.pattern, tangent)
+        whole = tangent if task.viscous is None else tangent + task.viscous
+        return stiffness(system.space, system.pattern, whole)
 
 
 def _solved(system: System, matrix: csr_matrix, rhs: np.ndarray) -> np.ndarray | Refusal:

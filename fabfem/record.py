@@ -113,7 +113,7 @@ def _head(problem: Problem) -> dict[str, Any]:
 
 def _entry(increment: Increment) -> dict[str, Any]:
     """Return what a report keeps of an increment."""
-    kept = ("stage", "number", "fraction", "size", "time", "iterations", "residuals", "out_of_balance", "moved")
+    kept = ("stage", "number", "fraction", "size", "time", "iterations", "residuals", "out_of_balance", "drag", "moved")
     return {name: getattr(increment, name) for name in kept} | {"cutbacks": len(increment.cutbacks)}
 
 

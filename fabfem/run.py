@@ -6,6 +6,7 @@ from typing import Any, NamedTuple
 
 from fabfem.case import Case, CaseError, read_case
 from fabfem.case.stages import Geostatic
+from fabfem.interrupt import held_back
 from fabfem.output.progress import Quiet, Terminal, summary
 from fabfem.problem import Problem, build
 from fabfem.record import Recorder, Timer
@@ -76,7 +77,8 @@ def _drive(steps: Iterator[Increment | Stopped], recorder: Recorder, shown: Quie
         for step in steps:
             if isinstance(step, Stopped):
                 return recorder.end("stopped", _why(step, recorder.problem), step.cutbacks)
-            recorder.add(step)
+            with held_back():
+                recorder.add(step)
             if isinstance(case.stage[step.stage_index], Geostatic):
                 shown.say(_audit(step, case.units.length))
             shown.advance(step.stage, step.stage_index + step.fraction, step.number, step.iterations)

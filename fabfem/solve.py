@@ -51,7 +51,7 @@ class Increment:
     states: States
     """State of each zone."""
     internal_force: np.ndarray
-    """(ndof,) nodal forces of the stress."""
+    """(ndof,) nodal forces of the stress, drag included."""
     external_force: np.ndarray
     """(ndof,) nodal forces of the loads."""
     iterations: int
@@ -60,6 +60,8 @@ class Increment:
     """Relative residual of every trial."""
     out_of_balance: float
     """Relative residual under the new loads before anything moved."""
+    drag: float
+    """Norm of the nodal forces of the viscous stress, relative as the residual is; 0 without viscosity."""
     moved: float
     """Largest displacement of a node in this increment."""
     cutbacks: tuple[Cutback, ...]
@@ -160,7 +162,9 @@ def _through(
             yield Stopped(stage.name, place.stage_index, fraction, *trial, step.cutbacks, timings)
             return None, number
         number, fraction, old = number + 1, step.fraction, now
-        now = Equilibrium(old.displacement + trial.step, trial.batch.states, trial.force, trial.batch.tangent)
+        now = Equilibrium(
+            old.displacement + trial.step, trial.batch.states, trial.force - trial.drag, trial.batch.tangent
+        )
         yield _increment(place, number, system, old, now, step, trial, system.clock.since(spent))
         size = _next_size(stage, system.controls, step)
         guess = _extrapolated(system, trial.step, step.size, min(size, 1.0 - fraction))
@@ -182,7 +186,7 @@ def _tried(
         target = fraction + size if fraction + 1.001 * size < 1.0 else 1.0
         size = target - fraction
         forces = load(target)
-        solved = solve_increment(system, now, forces, system.constraints.motion * size, guess)
+        solved = solve_increment(system, now, forces, size, guess)
         if isinstance(solved.end, Trial):
             return _Step(solved, target, size, forces, cutbacks)
         cutbacks += (Cutback(stage.name, fraction, size, *solved.end),)
@@ -222,11 +226,12 @@ def _increment(
         time=place.time + step.fraction * place.stage.duration,
         displacement=now.displacement,
         states=now.states,
-        internal_force=now.force,
+        internal_force=trial.force,
         external_force=step.load,
         iterations=step.solved.iterations,
         residuals=step.solved.residuals,
         out_of_balance=relative(start, old.force, step.load),
+        drag=relative(norm(trial.drag), trial.force, step.load),
         moved=float(np.linalg.norm(system.space.displacement(trial.step), axis=1).max()),
         cutbacks=step.cutbacks,
         worst_point=trial.batch.worst_point,
