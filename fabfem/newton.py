@@ -4,98 +4,18 @@ A correction that overshoots or makes the residual rise too much is shortened a 
 elastic tangent is tried for one correction; then the increment is refused, with a sentence, and the caller makes it
 smaller. The first trial carries the last increment on, or comes from the tangent of the last equilibrium (elastic where
 a stage begins).
-
-With viscosity η (see `Controls`) the points also carry the stress η/Δt D_e Δε, D_e the elastic tangent where the
-increment begins and Δt the increment's part of the stage. It is no part of the state; its nodal forces are the drag.
 """
 
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
-from time import perf_counter
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
 from scipy.sparse import csr_matrix
 
-from fabfem.assembly import Pattern, stiffness
-from fabfem.linear import LinearSolver, norm
-from fabfem.model import Batch, Controls, Refusal, States, Zone, elastic_tangents, update_points
-from fabfem.space import Space
-from fabfem.supports import Constraints, Reduction
-
-
-class Clock:
-    """Seconds spent in each phase."""
-
-    def __init__(self) -> None:
-        self.spent = {"material": 0.0, "assembly": 0.0, "linear_solve": 0.0}
-
-    @contextmanager
-    def phase(self, name: str) -> Iterator[None]:
-        """Add the time of a block to a phase."""
-        begun = perf_counter()
-        try:
-            yield
-        finally:
-            self.spent[name] += perf_counter() - begun
-
-    def since(self, before: Mapping[str, float]) -> dict[str, float]:
-        """Seconds spent in each phase after a copy of `spent` was made."""
-        return {name: seconds - before[name] for name, seconds in self.spent.items()}
-
-
-class System(NamedTuple):
-    """The equations of a stage."""
-
-    space: Space
-    zones: Mapping[str, Zone]
-    controls: Controls
-    constraints: Constraints
-    pattern: Pattern
-    reduce: Reduction
-    solver: LinearSolver
-    clock: Clock
-    stiffest: float
-    """Largest diagonal entry of the elastic stiffness."""
-
-
-class Equilibrium(NamedTuple):
-    """A state at rest, and the step that led to it."""
-
-    displacement: np.ndarray
-    states: States
-    force: np.ndarray
-    """(ndof,) internal force, without drag."""
-    tangent: np.ndarray
-    """(npoints, 6, 6) what the first correction of the next increment uses."""
-
-
-class Task(NamedTuple):
-    """What an increment has to balance."""
-
-    load: np.ndarray
-    """(ndof,) external force at its end."""
-    motion: np.ndarray
-    """Displacement of the held dofs in it."""
-    viscous: np.ndarray | None
-    """(npoints, 6, 6) viscous stress by strain increment, where there is viscosity."""
-
-
-class Trial(NamedTuple):
-    """A displacement increment and what it leaves out of balance."""
-
-    step: np.ndarray
-    """(ndof,) displacement since the last equilibrium."""
-    batch: Batch
-    force: np.ndarray
-    """(ndof,) internal force, drag included."""
-    drag: np.ndarray
-    """(ndof,) nodal forces of the viscous stress."""
-    unbalanced: np.ndarray
-    """Out-of-balance force on free dofs."""
-    norm: float
-    residual: float
-    """The norm relative to the forces at work."""
+from fabfem.assembly import stiffness
+from fabfem.linear import norm
+from fabfem.model import Controls, Refusal, elastic_tangents
+from fabfem.trial import Equilibrium, System, Task, Trial, attempt, make_task
 
 
 class Solved(NamedTuple):
@@ -115,7 +35,7 @@ def solve_increment(
 
     `guess` is a displacement increment to start from; without one a solve with the old tangent makes it.
     """
-    task = Task(load, size * system.constraints.motion, _viscous(system, old, size))
+    task = make_task(system, old, load, size)
     residuals: list[float] = []
     iterations = 0
     trial: Trial | Refusal = Refusal("") if guess is None else attempt(system, old, task, guess)
@@ -133,38 +53,6 @@ def solve_increment(
         trial = _corrected(system, old, task, trial)
         iterations += 1
     return Solved(trial, iterations, tuple(residuals))
-
-
-def _viscous(system: System, old: Equilibrium, size: float) -> np.ndarray | None:
-    eta = system.controls.viscosity
-    return eta / size * elastic_tangents(system.zones, old.states, system.space.npoints) if eta > 0.0 else None
-
-
-def attempt(system: System, old: Equilibrium, task: Task, step: np.ndarray) -> Trial | Refusal:
-    """What a displacement increment leaves out of balance, or why the points refuse it."""
-    strain = system.space.strain(step)
-    with system.clock.phase("material"):
-        batch = update_points(system.zones, strain, old.states)
-    if isinstance(batch, Refusal):
-        return batch
-    with system.clock.phase("assembly"):
-        drag = _drag(system, task, strain)
-        force = system.space.internal_force(batch.stress) + drag
-    unbalanced = (task.load - force)[system.constraints.free]
-    size = norm(unbalanced)
-    return Trial(step, batch, force, drag, unbalanced, size, relative(size, force, task.load))
-
-
-def _drag(system: System, task: Task, strain: np.ndarray) -> np.ndarray:
-    if task.viscous is None:
-        return np.zeros(system.space.ndof)
-    return system.space.internal_force((task.viscous @ strain[:, :, None])[:, :, 0])
-
-
-def relative(size: float, force: np.ndarray, load: np.ndarray) -> float:
-    """The norm of an out-of-balance force over the larger of internal and external force."""
-    scale = max(norm(force), norm(load))
-    return size / scale if scale > 0.0 else 0.0
 
 
 def _round_off(system: System, step: np.ndarray) -> float:

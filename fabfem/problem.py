@@ -98,7 +98,8 @@ def _stages(case: Case, space: Space) -> tuple[Stage, ...]:
 
 
 def _controls(case: Case) -> Controls:
-    return Controls(tolerance=case.solver.tolerance, max_iterations=case.solver.iterations)
+    said = case.solver
+    return Controls(said.tolerance, said.iterations, viscosity=said.viscosity, held=said.held)
 
 
 def _check_names(case: Case, mesh: Mesh) -> None:

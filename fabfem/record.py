@@ -113,8 +113,9 @@ def _head(problem: Problem) -> dict[str, Any]:
 
 def _entry(increment: Increment) -> dict[str, Any]:
     """Return what a report keeps of an increment."""
-    kept = ("stage", "number", "fraction", "size", "time", "iterations", "residuals", "out_of_balance", "drag", "moved")
-    return {name: getattr(increment, name) for name in kept} | {"cutbacks": len(increment.cutbacks)}
+    kept = ("stage", "number", "fraction", "size", "time", "iterations", "residuals", "out_of_balance")
+    found = {name: getattr(increment, name) for name in (*kept, "drag", "held", "moved")}
+    return found | {"cutbacks": len(increment.cutbacks)}
 
 
 def _place(problem: Problem, increment: Increment) -> dict[str, Any]:

@@ -76,6 +76,7 @@ def _drive(steps: Iterator[Increment | Stopped], recorder: Recorder, shown: Quie
     try:
         for step in steps:
             if isinstance(step, Stopped):
+                recorder.timer.add(step.timings)
                 return recorder.end("stopped", _why(step, recorder.problem), step.cutbacks)
             with held_back():
                 recorder.add(step)

@@ -14,10 +14,11 @@ from fabfem.assembly import Pattern, find_pattern, stiffness
 from fabfem.linear import make_solver, norm
 from fabfem.loads import external_force
 from fabfem.model import Controls, Model, Refusal, States, elastic_tangents, initial_stress
-from fabfem.newton import Clock, Equilibrium, Solved, System, Trial, relative, solve_increment
+from fabfem.newton import Solved, solve_increment
 from fabfem.space import Space
 from fabfem.stages import Stage
 from fabfem.supports import constrain, reduction
+from fabfem.trial import Clock, Equilibrium, System, Trial, relative
 
 
 @dataclass(frozen=True)
@@ -62,6 +63,8 @@ class Increment:
     """Relative residual under the new loads before anything moved."""
     drag: float
     """Norm of the nodal forces of the viscous stress, relative as the residual is; 0 without viscosity."""
+    held: int
+    """Points that kept their old stress and state because the material refused them; see `Controls`."""
     moved: float
     """Largest displacement of a node in this increment."""
     cutbacks: tuple[Cutback, ...]
@@ -232,6 +235,7 @@ def _increment(
         residuals=step.solved.residuals,
         out_of_balance=relative(start, old.force, step.load),
         drag=relative(norm(trial.drag), trial.force, step.load),
+        held=trial.batch.held,
         moved=float(np.linalg.norm(system.space.displacement(trial.step), axis=1).max()),
         cutbacks=step.cutbacks,
         worst_point=trial.batch.worst_point,

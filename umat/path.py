@@ -1,9 +1,9 @@
 """Element tests: one stress point, or many, led along a path by six linear conditions.
 
-A `Leg` holds six conditions on the stress and the strain since its start, S Δσ + E Δε = v. They are met at the fractions
-t of the leg, S Δσ + E Δε = t v, by Newton's method on the strain with the tangent of the point, so a path is as
-accurate as `umat.update` and drifts from no condition. Each point takes its own steps: halved where it refuses them,
-grown where they are easy, cut at the fractions that are recorded. Stress and strain are Mandel vectors, compression positive.
+A `Leg` holds six conditions on the stress and the strain since its start, S Δσ + E Δε = v. They are met at the
+fractions t of the leg, S Δσ + E Δε = t v, by Newton's method on the strain with the tangent of the point, so a path is
+as accurate as `umat.update` and drifts from no condition. Each point takes its own steps: halved where it refuses them,
+grown where they are easy, cut at the fractions that are recorded. Compression is positive.
 
 The presets return legs. Axes: `vertical` and `horizontal` span the plane in which principal axes are turned by α from
 the vertical; the third axis is that of the intermediate principal stress, b = (σ2 − σ3)/(σ1 − σ3).
@@ -18,6 +18,8 @@ from .directions import AXES, Axis
 from .interface import Response, elastic_tangent, update
 from .mandel import IDENTITY, Array, deviator, from_tensor, norm
 from .status import OK
+
+UNDETERMINED = 1e-11
 
 
 class Leg(NamedTuple):
@@ -92,8 +94,8 @@ def follow(
         while (ids := np.flatnonzero(~walk.stopped & (walk.reached < fraction))).size:
             _step(material, directions, walk, ids, leg, fraction, controls)
         seen.append(_seen(walk))
-    columns = [np.array(column) for column in zip(*seen, strict=True)]
-    return History(fractions, *columns, walk.state, walk.reached, walk.steps, walk.work)
+    stress, strain, void_ratio, fabric = (np.array(column) for column in zip(*seen, strict=True))
+    return History(fractions, stress, strain, void_ratio, fabric, walk.state, walk.reached, walk.steps, walk.work)
 
 
 def _checked(leg: Leg, n: int) -> Leg:
@@ -203,17 +205,20 @@ def _scale(leg: Leg, response: Response, old: Any, increment: Array) -> Array:
 
 
 def _solve(leg: Leg, tangent: Array, missing: Array) -> Array:
-    """Return the strain (n, 6) that makes up for what is missing, along the tangent."""
+    """Return the least strain (n, 6) that makes up for what is missing, along the tangent.
+
+    At a corner of a perfectly plastic yield surface the conditions leave a part of the strain open; it stays zero.
+    """
     matrix = leg.on_stress @ tangent + leg.on_strain
-    scale = 1.0 / np.maximum(norm(matrix), np.finfo(float).tiny)
-    matrix, missing = matrix * scale[..., None], missing * scale
-    try:
-        return np.linalg.solve(matrix, missing[..., None])[..., 0]
-    except np.linalg.LinAlgError:
-        return _apply(np.linalg.pinv(matrix), missing)
+    size = norm(leg.on_stress) * np.linalg.norm(tangent, axis=(1, 2))[:, None] + norm(leg.on_strain)
+    scale = 1.0 / np.maximum(size, np.finfo(float).tiny)
+    good = np.isfinite(np.linalg.norm(matrix, axis=(1, 2)))
+    matrix = np.where(good[:, None, None], matrix * scale[..., None], 0.0)
+    inverse = np.asarray(np.linalg.pinv(matrix, rcond=UNDETERMINED), dtype=float)
+    return _apply(inverse, missing * scale)
 
 
-# --- presets -----------------------------------------------------------------------------------------------------------
+# --- presets --------------------------------------------------------------------------------------------------------
 
 
 def strained(strain: ArrayLike) -> Leg:
@@ -232,7 +237,7 @@ def isotropic(change: float) -> Leg:
 
 
 def triaxial(strain: float, vertical: Axis = "z") -> Leg:
-    """Return drained triaxial compression to an axial strain [-], extension if it is negative: Δσ3 = 0, no shear stress."""
+    """Return drained triaxial compression to an axial strain [-], extension if negative: Δσ3 = 0, no shear stress."""
     axis = AXES.index(vertical)
     on_stress, on_strain = np.eye(6), np.zeros((6, 6))
     on_stress[axis], on_strain[axis, axis] = 0.0, 1.0
@@ -243,7 +248,7 @@ def undrained(strain: float, alpha: float = 0.0, b: float = 0.0, vertical: Axis 
     """Return shear at constant volume to ε1 − ε3 [-] along principal stress axes held at α [deg], with b held.
 
     The total mean stress is not asked for: constant volume decides the effective one. α = 0, b = 0 is triaxial
-    compression, α = 90°, b = 1 extension. The stress that the leg starts from must have these axes and b, or be isotropic.
+    compression, α = 90°, b = 1 extension. The stress at the start must have these axes and b, or be isotropic.
     """
     return _fixed_axes(strain, alpha, b, vertical, horizontal, drained=False)
 
@@ -254,7 +259,7 @@ def constant_p(strain: float, alpha: float = 0.0, b: float = 0.0, vertical: Axis
 
 
 def principal_dyads(alpha: float, vertical: Axis = "z", horizontal: Axis = "x") -> Array:
-    """Return the dyads (3, 6) of the axes of σ1, σ2, σ3; that of σ1 is turned by α [deg] from vertical to horizontal."""
+    """Return the dyads (3, 6) of the axes of σ1, σ2, σ3; that of σ1 turns by α [deg] from vertical to horizontal."""
     if vertical == horizontal:
         raise ValueError(f"vertical and horizontal are both {vertical}")
     up, across = np.eye(3)[AXES.index(vertical)], np.eye(3)[AXES.index(horizontal)]

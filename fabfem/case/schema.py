@@ -7,7 +7,7 @@ from pydantic import Field, PrivateAttr
 
 from fabfem.case.materials import AnyMaterial
 from fabfem.case.stages import AnyStage, Component, Support
-from fabfem.case.table import Factors, Identifier, Names, Positive, Table, Text
+from fabfem.case.table import Factors, Identifier, Names, NotNegative, Positive, Table, Text
 from fabfem.units import FORCES, LENGTHS, Units
 
 
@@ -45,6 +45,10 @@ class Solver(Table):
     """Largest out-of-balance force over the size of the forces in play."""
     iterations: Annotated[int, Field(ge=1)] = 16
     """Most iterations of an increment before it is cut."""
+    viscosity: NotNegative = 0.0
+    """Stress that resists the rate of strain, over the elastic stress of the same strain in one stage."""
+    held: Annotated[float, Field(ge=0, le=1)] = 0.0
+    """Share of the points that may keep their stress in an increment where the material refuses them."""
     linear: Literal["auto", "superlu", "pardiso"] = "auto"
     """Linear solver; auto takes PARDISO where it is installed."""
     threads: Annotated[int, Field(ge=0)] = 0

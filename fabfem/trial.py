@@ -1,0 +1,127 @@
+"""One trial of an increment: a displacement step and the force that it leaves out of balance.
+
+With viscosity η (see `Controls`) the points also carry the stress η/Δt D_e Δε, D_e the elastic tangent where the
+increment begins and Δt the increment's part of the stage. It is no part of the state; its nodal forces are the drag.
+"""
+
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from time import perf_counter
+from typing import NamedTuple
+
+import numpy as np
+
+from fabfem.assembly import Pattern
+from fabfem.linear import LinearSolver, norm
+from fabfem.model import Batch, Controls, Refusal, States, Zone, elastic_tangents, update_points
+from fabfem.space import Space
+from fabfem.supports import Constraints, Reduction
+
+
+class Clock:
+    """Seconds spent in each phase."""
+
+    def __init__(self) -> None:
+        self.spent = {"material": 0.0, "assembly": 0.0, "linear_solve": 0.0}
+
+    @contextmanager
+    def phase(self, name: str) -> Iterator[None]:
+        """Add the time of a block to a phase."""
+        begun = perf_counter()
+        try:
+            yield
+        finally:
+            self.spent[name] += perf_counter() - begun
+
+    def since(self, before: Mapping[str, float]) -> dict[str, float]:
+        """Seconds spent in each phase after a copy of `spent` was made."""
+        return {name: seconds - before[name] for name, seconds in self.spent.items()}
+
+
+class System(NamedTuple):
+    """The equations of a stage."""
+
+    space: Space
+    zones: Mapping[str, Zone]
+    controls: Controls
+    constraints: Constraints
+    pattern: Pattern
+    reduce: Reduction
+    solver: LinearSolver
+    clock: Clock
+    stiffest: float
+    """Largest diagonal entry of the elastic stiffness."""
+
+
+class Equilibrium(NamedTuple):
+    """A state at rest, and the step that led to it."""
+
+    displacement: np.ndarray
+    states: States
+    force: np.ndarray
+    """(ndof,) internal force, without drag."""
+    tangent: np.ndarray
+    """(npoints, 6, 6) what the first correction of the next increment uses."""
+
+
+class Task(NamedTuple):
+    """What an increment has to balance."""
+
+    load: np.ndarray
+    """(ndof,) external force at its end."""
+    motion: np.ndarray
+    """Displacement of the held dofs in it."""
+    viscous: np.ndarray | None
+    """(npoints, 6, 6) viscous stress by strain increment, where there is viscosity."""
+
+
+class Trial(NamedTuple):
+    """A displacement increment and what it leaves out of balance."""
+
+    step: np.ndarray
+    """(ndof,) displacement since the last equilibrium."""
+    batch: Batch
+    force: np.ndarray
+    """(ndof,) internal force, drag included."""
+    drag: np.ndarray
+    """(ndof,) nodal forces of the viscous stress."""
+    unbalanced: np.ndarray
+    """Out-of-balance force on free dofs."""
+    norm: float
+    residual: float
+    """The norm relative to the forces at work."""
+
+
+def make_task(system: System, old: Equilibrium, load: np.ndarray, size: float) -> Task:
+    """What an increment has to balance that takes a part `size` of the stage."""
+    eta, viscous = system.controls.viscosity, None
+    if eta > 0.0:
+        viscous = eta / size * elastic_tangents(system.zones, old.states, system.space.npoints)
+    return Task(load, size * system.constraints.motion, viscous)
+
+
+def attempt(system: System, old: Equilibrium, task: Task, step: np.ndarray) -> Trial | Refusal:
+    """What a displacement increment leaves out of balance, or why the points refuse it."""
+    strain = system.space.strain(step)
+    with system.clock.phase("material"):
+        batch = update_points(system.zones, strain, old.states, system.controls.held)
+    if isinstance(batch, Refusal):
+        return batch
+    with system.clock.phase("assembly"):
+        drag = _drag(system, task, strain)
+        force = system.space.internal_force(batch.stress) + drag
+    unbalanced = (task.load - force)[system.constraints.free]
+    size = norm(unbalanced)
+    return Trial(step, batch, force, drag, unbalanced, size, relative(size, force, task.load))
+
+
+def _drag(system: System, task: Task, strain: np.ndarray) -> np.ndarray:
+    if task.viscous is None:
+        return np.zeros(system.space.ndof)
+    return system.space.internal_force((task.viscous @ strain[:, :, None])[:, :, 0])
+
+
+def relative(size: float, force: np.ndarray, load: np.ndarray) -> float:
+    """The norm of an out-of-balance force over the larger of internal and external force."""
+    scale = max(norm(force), norm(load))
+    return size / scale if scale > 0.0 else 0.0
