@@ -11,8 +11,8 @@ import gmsh
 
 HALF = 0.45
 WIDTH = DEPTH = 5 * 2 * HALF
-FINE, FOOTING, COARSE = 0.02, 0.04, 0.45
-"""Element size at the footing's edge, below the footing, and far away [m]."""
+FINE, FOOTING, COARSE, GROWTH = 0.045, 0.05, 0.45, 0.085
+"""Element size at the footing's edge (B/20), below the footing, and far away [m]; growth with the distance [-]."""
 
 
 def draw() -> None:
@@ -38,7 +38,7 @@ def grade(edge: int, footing: int) -> None:
         field.setNumbers(distance, what, [tag])
         field.setNumber(distance, "Sampling", 200)
         size = field.add("MathEval")
-        field.setString(size, "F", f"Min({start} + 0.105 * F{distance}, {COARSE})")
+        field.setString(size, "F", f"Min({start} + {GROWTH} * F{distance}, {COARSE})")
         sizes.append(size)
     smallest = field.add("Min")
     field.setNumbers(smallest, "FieldsList", sizes)

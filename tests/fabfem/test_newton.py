@@ -70,6 +70,13 @@ def test_the_first_guess_does_not_change_the_answer(name: str, extrapolate: bool
     np.testing.assert_allclose(ends[0].displacement, ends[1].displacement, atol=1e-9)
 
 
+@pytest.mark.parametrize("name", MATERIALS)
+def test_shortened_corrections_do_not_change_the_answer(name: str) -> None:
+    ends = [list(march(footing(name, tolerance=1e-10, turn=turn)))[-1] for turn in (0.8, 0.1, np.inf)]
+    for end in ends[1:]:
+        np.testing.assert_allclose(ends[0].displacement, end.displacement, atol=1e-9)
+
+
 def test_a_refused_point_is_named() -> None:
     model = footing("von_mises")
     strain = np.zeros((model.space.npoints, 6))

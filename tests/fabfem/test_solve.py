@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
@@ -16,7 +16,8 @@ from fabfem.solve import Increment, Stopped, march, reaction
 from fabfem.space import Space, build_space
 from fabfem.stages import Stage
 from fabfem.supports import Support
-from umat import Elastic, VonMises, initial_state
+from umat import Elastic, Response, VonMises, elastic_tangent, initial_state, symmetric_tangent, update
+from umat.status import NO_CONVERGENCE, OK
 
 ROLLERS = (Support("left", "x"), Support("right", "x"), Support("bottom", "y"))
 FIXED = (*ROLLERS, Support("bottom", "x"))
@@ -188,6 +189,72 @@ def test_records_of_an_increment() -> None:
     assert total[0] == pytest.approx(-total[1], rel=1e-6)
     strip = model.space.mesh.points[model.space.mesh.boundary("strip"), 0].max()
     assert total[1] == pytest.approx(-50.0 * strip)
+
+
+def test_viscosity_resists_the_rate() -> None:
+    """At a constant rate the drag is η times the elastic force of the whole stage, however fine the increments."""
+    space = build_space(box_mesh("quad8", (2, 2), (0, 0), (1, 1)), KINEMATICS["plane_strain"])
+    held = (*ROLLERS, Support("top", "y", -0.01))
+    for size in (0.25, 0.1):
+        stage = Stage("press", held, first=size, largest=size)
+        plain, slow = (
+            run(Model(space, filled(space, ELASTIC), (stage,), Controls(1e-9, viscosity=eta))) for eta in (0.0, 0.05)
+        )
+        whole = reaction(space, plain[-1], "top", "y")
+        for a, b in zip(plain, slow, strict=True):
+            assert reaction(space, b, "top", "y") == pytest.approx(reaction(space, a, "top", "y") + 0.05 * whole)
+            assert (a.drag, b.drag) == pytest.approx((0.0, 0.05 / (0.05 + a.fraction)))
+            np.testing.assert_allclose(a.states["all"].stress, b.states["all"].stress, atol=1e-6)
+
+
+class Fussy(NamedTuple):
+    """Elastic, but a point that is strained by more than `limit` in an increment is refused."""
+
+    elastic: Elastic
+    limit: float
+
+
+@update.register
+def _(material: Fussy, directions: None, strain_increment: np.ndarray, old: Any) -> Response:
+    answer = update(material.elastic, directions, strain_increment, old)
+    refused = np.abs(strain_increment).max(axis=1) > material.limit
+    answer.stress[refused], answer.tangent[refused] = old.stress[refused], 0.0
+    state = answer.state._replace(stress=answer.stress)
+    return answer._replace(state=state, status=np.where(refused, NO_CONVERGENCE, OK).astype(np.int8))
+
+
+@initial_state.register
+def _(material: Fussy, directions: None, stress: np.ndarray) -> Any:
+    return initial_state(material.elastic, directions, stress)
+
+
+@symmetric_tangent.register
+def _(material: Fussy) -> bool:
+    return True
+
+
+@elastic_tangent.register
+def _(material: Fussy, state: Any) -> np.ndarray:
+    return elastic_tangent(material.elastic, state)
+
+
+def test_refused_points_may_be_held() -> None:
+    """Near the edge of a stamp a few points are strained most; they keep their stress, the others carry the rest."""
+    mesh = box_mesh("triangle6", (8, 6), (0.0, -3.0), (4.0, 0.0))
+    mesh = named(mesh, stamp=(mesh.points[:, 1] == 0.0) & (mesh.points[:, 0] <= 1.0))
+    space = build_space(mesh, KINEMATICS["plane_strain"])
+    held = (*FIXED, Support("stamp", "x"), Support("stamp", "y", -0.01))
+    stage = Stage("press", held, first=0.5, largest=0.5, smallest=0.4)
+    model = Model(space, filled(space, Fussy(ELASTIC, 3e-3)), (stage,), Controls(1e-8))
+    stopped = list(march(model))[-1]
+    assert isinstance(stopped, Stopped)
+    assert "points of zone 'all'" in stopped.reason
+    steps = run(replace(model, controls=replace(model.controls, held=0.1)))
+    assert 0 < max(step.held for step in steps) <= 0.1 * space.npoints
+    elastic = run(replace(model, zones=filled(space, ELASTIC)))
+    assert all(step.held == 0 for step in elastic)
+    force, most = (reaction(space, steps[-1], "stamp", "y") for steps in (steps, elastic))
+    assert 0.5 * abs(most) < abs(force) < abs(most)
 
 
 def test_a_run_of_rigid_motion_makes_no_stress() -> None:

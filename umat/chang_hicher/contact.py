@@ -26,8 +26,10 @@ from .rows import (
     DILATANCY,
     DISPLACEMENT,
     FABRIC_MIDDLE,
+    FACTOR,
     FORCE,
     FORCE_OLD,
+    FRESH,
     FRICTION,
     LATE,
     MARGIN,
@@ -36,6 +38,7 @@ from .rows import (
     STIFFNESS,
     STIFFNESS_SLIPPED,
     SUMS,
+    TAKEN,
 )  # fmt: skip
 
 TINY = 1e-200
@@ -44,10 +47,11 @@ GROUP = 4  #: directions whose contributions are added in one pass over the sums
 
 
 @kernel
-def contact_plane(rows, before, after, out, n, weight, elastic, width):
+def contact_plane(rows, before, after, kept, tried, out, n, weight, elastic, width):
     """Fill one direction's buffer `out` with displacements and their derivatives, times the direction's weight.
 
-    rows: the lanes, flat; before, after: rows of the sliding done before and after the step; out: `BUFFER` rows, flat
+    rows: the lanes, flat; before, after: rows of the sliding done before and after the step; kept, tried: what the
+    estimate of the sliding needs of the accepted iterate and of the trial, `GUESS` rows; out: `BUFFER` rows, flat
     (arrays of their own, and constant places in them, or the compiler sees too many overlaps to check);
     elastic: (compliance, 1/k_tR, 1/(2 k_pR)).
     """
@@ -85,6 +89,7 @@ def contact_plane(rows, before, after, out, n, weight, elastic, width):
         # inside only if force and density are positive; the arithmetic below stays finite in any case
         rows[at(MARGIN, l)] = np.minimum(rows[at(MARGIN, l)], np.minimum(room / gn, density))
         fn = np.maximum(fn, 1e-30)
+        space = room
         room = np.maximum(room, 1e-12 * fn)
         w = weight * density
         # elastic
@@ -101,23 +106,34 @@ def contact_plane(rows, before, after, out, n, weight, elastic, width):
         ez = dn * nz + ease_t * (tz - hz)
         # sliding
         ratio = ft * i_fn
-        need = ease_p * compliance * tan_p
-        required = need * s * ft * i_room
+        push = ease_p * compliance * s * ft
+        required = push * tan_p * i_room
         done = before[l]
         share = rows[at(SHARE, l)]
         slip = share * np.maximum(required - done, 0.0)
         on = select(required > done, share, 0.0)
         after[l] = done + slip
+        # the slope is that of λ room = push · tanφ_p at an estimate of λ: see the module's docstring
+        taken = rows[at(TAKEN, l)] > 0.5
+        k_room = select(taken, tried[at(0, l)], kept[at(0, l)])
+        k_required = select(taken, tried[at(1, l)], kept[at(1, l)])
+        k_slid = select(taken, tried[at(2, l)], kept[at(2, l)])
+        kept[at(0, l)], kept[at(1, l)], kept[at(2, l)] = k_room, k_required, k_slid
+        change = (required - k_required) * room + (k_required - k_slid) * (room - k_room)
+        slid = k_required + change / (rows[at(FACTOR, l)] * k_room)
+        near = np.abs(slid - required) < 0.1 * required
+        trusted = (k_required > done) & (slid > done) & (rows[at(FRESH, l)] < 0.5)
+        slid = select(trusted, select(near, required, slid), required)
+        tried[at(0, l)], tried[at(1, l)], tried[at(2, l)] = space, required, slid
         ax, ay, az = tx * i_ft, ty * i_ft, tz * i_ft
-        by_ratio = need * s * tan_p * fn * fn * i_room * i_room
-        along_n = required * 0.5 * i_fn - by_ratio * ratio * i_fn
-        along_t = by_ratio * i_fn
+        along_n = (0.5 * push * tan_p * i_fn - slid * tan_p) * i_room
+        along_t = (ease_p * compliance * s * tan_p + slid) * i_room
         qx, qy, qz = (
             on * (along_n * nx + along_t * ax),
             on * (along_n * ny + along_t * ay),
             on * (along_n * nz + along_t * az),
         )
-        by_tan = -on * ease_p * compliance * s * ft * ft * i_room * i_room
+        by_tan = on * (push - slid * fn) * i_room
         # direction of sliding at the middle and at the end
         ux, uy, uz = ux * i_um, uy * i_um, uz * i_um
         ratio_m = um * i_mid
@@ -207,7 +223,7 @@ def add_moments(rows, buffer, table, first, terms, width):
 
 
 @kernel
-def sum_planes(rows, slide, base, buffer, rule, terms, fabric_terms, elastic, total, evolving, width):
+def sum_planes(rows, slide, guess, base, buffer, rule, terms, fabric_terms, elastic, total, evolving, width):
     """Sum displacement, its moments and derivatives over all contact planes, into the rows from `SUMS` on."""
     normals, weights, table = rule
     count = weights.shape[0]
@@ -223,7 +239,10 @@ def sum_planes(rows, slide, base, buffer, rule, terms, fabric_terms, elastic, to
                         rows[at(BASE + i, l)] = base[at(3 * a + i, l)]
             n = (normals[a, 0], normals[a, 1], normals[a, 2])
             before, after = slide[a * LANES : (a + 1) * LANES], slide[(count + a) * LANES : (count + a + 1) * LANES]
-            contact_plane(rows, before, after, buffer[k * SIZE : (k + 1) * SIZE], n, weights[a], elastic, width)
+            kept, tried = guess[6 * a * LANES : (6 * a + 3) * LANES], guess[(6 * a + 3) * LANES : (6 * a + 6) * LANES]
+            contact_plane(
+                rows, before, after, kept, tried, buffer[k * SIZE : (k + 1) * SIZE], n, weights[a], elastic, width
+            )
         add_moments(rows, buffer, table, first, terms, width)
         if evolving:
             add_moments(rows, buffer, table, first, fabric_terms, width)

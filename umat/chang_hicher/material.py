@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from ..directions import Directions
 from ..fabric import Constant, ZhaoKruyt
 from ..interface import checked_vectors
-from ..mandel import DEVIATORIC, SPHERICAL, Array, deviator, dot, norm, principal, to_tensor
+from ..mandel import DEVIATORIC, IDENTITY, SPHERICAL, Array, deviator, dot, norm, principal, to_tensor
 from ..mandel import p as mean
 from .planes import Rule, padded
 from .pool import Constants
@@ -177,12 +177,19 @@ def elastic(material: ChangHicher, state: ChangHicherState) -> Array:
     With F = 0, f = (3/c) σ n and ⟨n_i n_j n_k n_l⟩ = (δ_ij δ_kl + δ_ik δ_jl + δ_il δ_jk)/15 the averages of [ZK
     Table 3] close:
     ε = (9/c) [(C_n − C_t) (tr σ I + 2σ)/15 + C_t σ/3], C_n = compliance / (2 √f_n), C_t = C_n / k_tR.
+    In the total form a change of the contact density at the same forces changes the stress too: dσ = σ dc/c,
+    de = −(1+e) dε_v.
     """
     constants = constants_of(material)
     compliance, ease_t, _ = constants.elastic
+    e = state.void_ratio
     p = np.maximum(mean(state.stress) / material.reference_pressure, material.open_pressure)
-    density = 3.0 / (2.0 * np.pi) * (13.28 - 8.0 * state.void_ratio) / (1.0 + state.void_ratio)
+    density = 3.0 / (2.0 * np.pi) * (13.28 - 8.0 * e) / (1.0 + e)
     normal = 0.5 * compliance / np.sqrt(3.0 * p / density) * 9.0 / density
     bulk = 1.0 / normal  # strain/3 of each axis is normal p / 3
     shear = 1.0 / (normal * (2.0 / 15.0 + ease_t / 5.0))
-    return (bulk[:, None, None] * 3.0 * SPHERICAL + shear[:, None, None] * DEVIATORIC) * material.reference_pressure
+    tangent = (bulk[:, None, None] * 3.0 * SPHERICAL + shear[:, None, None] * DEVIATORIC) * material.reference_pressure
+    if constants.total:
+        by_volume = (8.0 * (1.0 + e) / (13.28 - 8.0 * e) + 1.0)[:, None] * state.stress  # −(1+e) σ c'/c
+        tangent += by_volume[:, :, None] * IDENTITY
+    return tangent

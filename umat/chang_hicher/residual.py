@@ -11,7 +11,6 @@ from ..lanes import LANES, at, kernel, lanes
 from .rows import (
     BY_VOID_STRAIN,
     COLUMNS,
-    DRIVE,
     ERRORS,
     FABRIC,
     FABRIC_ERROR,
@@ -25,7 +24,6 @@ from .rows import (
     LAW_SLOPE,
     LENGTH,
     MATRIX,
-    MISSING,
     NEWTON,
     NORM,
     OLD,
@@ -38,7 +36,6 @@ from .rows import (
     RATIO_SLOPE,
     SHARE,
     SLOPE,
-    STEP,
     STRAIN,
     STRESS_ERROR,
     STRESS_NORM,
@@ -157,28 +154,16 @@ def gather(rows, components, evolving, width):
 
 @kernel
 def norms(rows, components, evolving, width):
-    """Fill the norm of the residual as a strain, of the sub-step's strain, and minus the residual along the step.
-
-    The latter, Σ (Δε − ε)·dσ with a share of the fabric equations, is what the line search wants small: strain grows
-    monotonically with stress, with a kink where a contact begins to slide, and the norm of the residual may have to
-    rise on the way across kinks.
-    """
+    """Fill the norm of the residual as a strain, and of the sub-step's strain."""
     nc = components.shape[0]
     for l in lanes(width):
-        rows[at(NORM, l)], rows[at(LENGTH, l)], rows[at(DRIVE, l)] = 0.0, 0.0, 0.0
+        rows[at(NORM, l)], rows[at(LENGTH, l)] = 0.0, 0.0
     for i in range(nc):
-        step = STEP + components[i]
         for l in lanes(width):
-            missing = rows[at(NEWTON + i, l)]
-            rows[at(MISSING + i, l)] = missing
-            rows[at(NORM, l)] += missing * missing
-            rows[at(DRIVE, l)] += missing * rows[at(step, l)]
+            rows[at(NORM, l)] += rows[at(NEWTON + i, l)] ** 2
         if evolving:
             for l in lanes(width):
-                missing = rows[at(NEWTON + nc + i, l)]
-                rows[at(MISSING + nc + i, l)] = missing
-                rows[at(NORM, l)] += (FABRIC_WEIGHT * missing) ** 2
-                rows[at(DRIVE, l)] += FABRIC_WEIGHT * rows[at(Y, l)] * missing * rows[at(step + FABRIC, l)]
+                rows[at(NORM, l)] += (FABRIC_WEIGHT * rows[at(NEWTON + nc + i, l)]) ** 2
     for i in range(6):
         for l in lanes(width):
             rows[at(LENGTH, l)] += rows[at(PART + i, l)] ** 2

@@ -17,6 +17,9 @@ _COUNTS = {
     "FABRIC_MIDDLE": 6,  # F at the middle, plain
     "MARGIN": 1,  # positive inside the domain
     "SHARE": 1,  # of the sliding required that is done in this sub-step; 1 but for relaxed ones
+    "TAKEN": 1,  # whether the trial evaluated last was accepted
+    "FRESH": 1,  # whether the sub-step has just begun
+    "FACTOR": 1,  # part of the Newton step in the trial
     "BASE": 3,  # the force of the plane that does not come from Z
     # states and unknowns
     "Y": 13,  # trial end of the step: stress, fabric, void ratio
@@ -61,7 +64,6 @@ _COUNTS = {
     # linear system
     "MATRIX": 144,
     "NEWTON": 12,  # minus the residual, then the Newton step
-    "MISSING": 12,  # minus the residual
     "TANGENT": 72,  # n × 6 right-hand sides, then derivatives of the unknowns by the strain increment
     "ERRORS": 12,  # first-order minus second-order residual, then the error of the unknowns
     "NORM": 1,
@@ -72,11 +74,6 @@ _COUNTS = {
     # step control
     "FRACTION": 1,
     "PORTION": 1,  # done, and of this sub-step
-    "FACTOR": 1,  # of the line search
-    "LOW": 1,
-    "HIGH": 1,  # its bracket
-    "DRIVE": 1,  # minus the residual along the step, now
-    "DRIVE_START": 1,  # and where the step began
     "BEST": 1,  # residual of the accepted iterate
     "ERROR": 1,
     "VOID_START": 1,
@@ -90,6 +87,7 @@ ROWS = sum(_COUNTS.values())
 
 FORCE, FORCE_OLD, FRICTION, DILATANCY = (_STARTS[k] for k in ("FORCE", "FORCE_OLD", "FRICTION", "DILATANCY"))
 FABRIC_MIDDLE, MARGIN, SHARE, BASE = (_STARTS[k] for k in ("FABRIC_MIDDLE", "MARGIN", "SHARE", "BASE"))
+TAKEN, FRESH = _STARTS["TAKEN"], _STARTS["FRESH"]
 Y, OLD, ACCEPTED, STEP, FULL, PART = (_STARTS[k] for k in ("Y", "OLD", "ACCEPTED", "STEP", "FULL", "PART"))
 INVERSE, SCALED, BY_FABRIC, BY_VOID = (_STARTS[k] for k in ("INVERSE", "SCALED", "BY_FABRIC", "BY_VOID"))
 P_FRICTION, P_DILATANCY = _STARTS["P_FRICTION"], _STARTS["P_DILATANCY"]
@@ -102,9 +100,8 @@ SLOPE, PLASTIC_SLOPE, GEO, PLASTIC_GEO = (_STARTS[k] for k in ("SLOPE", "PLASTIC
 INPUTS, GAIN, GAIN_END = _STARTS["INPUTS"], _STARTS["GAIN"], _STARTS["GAIN_END"]
 LAW_SLOPE, RATIO_SLOPE, RATIO_OLD = _STARTS["LAW_SLOPE"], _STARTS["RATIO_SLOPE"], _STARTS["RATIO_OLD"]
 FABRIC_SLOPE = _STARTS["FABRIC_SLOPE"]
-MATRIX, NEWTON, MISSING = _STARTS["MATRIX"], _STARTS["NEWTON"], _STARTS["MISSING"]
+MATRIX, NEWTON = _STARTS["MATRIX"], _STARTS["NEWTON"]
 TANGENT, ERRORS = _STARTS["TANGENT"], _STARTS["ERRORS"]
-LOW, HIGH, DRIVE, DRIVE_START = (_STARTS[k] for k in ("LOW", "HIGH", "DRIVE", "DRIVE_START"))
 NORM, LENGTH, STRESS_NORM = _STARTS["NORM"], _STARTS["LENGTH"], _STARTS["STRESS_NORM"]
 STRESS_ERROR, FABRIC_ERROR = _STARTS["STRESS_ERROR"], _STARTS["FABRIC_ERROR"]
 FRACTION, PORTION, FACTOR, BEST, ERROR, VOID_START, CLOSING, BY_VOID_STRAIN = (
