@@ -50,7 +50,8 @@ from .rows import (
 SQRT2 = 2.0**0.5
 HALF_SQRT2 = 0.5 * SQRT2
 DENSITY = 3.0 / (2.0 * np.pi)  #: of c(e) = DENSITY (13.28 − 8 e) / (1 + e)
-FLOOR = 0.02  #: least critical void ratio for which the law is used
+FLOOR = 0.02  #: least void ratio, and critical void ratio, for which the law is used
+MAX_VOID_RATIO = 1.64  #: the contact density ∝ 13.28 − 8 e stays positive
 
 
 @kernel
@@ -145,7 +146,7 @@ def friction(rows, line, tan_mu, width):
         void, void_old = rows[at(Y + 12, l)], rows[at(OLD + 12, l)]
         critical, slope = critical_void_ratio(p, line)
         critical_old, _ = critical_void_ratio(p_old, line)
-        rows[at(MARGIN, l)] = np.minimum(critical - FLOOR, p)
+        rows[at(MARGIN, l)] = np.minimum(np.minimum(critical - FLOOR, p), MAX_VOID_RATIO - void)
         critical, critical_old = np.maximum(critical, FLOOR), np.maximum(critical_old, FLOOR)
         i_void, i_critical = 1.0 / void, 1.0 / critical
         tan_p = critical * i_void * tan_mu

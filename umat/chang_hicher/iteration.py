@@ -57,6 +57,13 @@ def begin(pool, l):
     specific = (1.0 + rows[spot(VOID_START, l)]) * np.exp(-(fraction + portion) * volume)
     rows[spot(Y + VOID, l)] = specific - 1.0
     rows[spot(BY_VOID_STRAIN, l)] = -specific * (fraction + portion)
+    again(pool, l)
+
+
+@kernel
+def again(pool, l):
+    """Begin to iterate from the trial state."""
+    rows = pool.rows
     rows[spot(FACTOR, l)], rows[spot(FRESH, l)], rows[spot(TAKEN, l)] = 1.0, 1.0, 1.0
     rows[spot(BEST, l)] = np.inf
     pool.counts[ITERATIONS, l] = 0

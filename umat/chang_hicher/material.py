@@ -182,7 +182,7 @@ def elastic(material: ChangHicher, state: ChangHicherState) -> Array:
     """
     constants = constants_of(material)
     compliance, ease_t, _ = constants.elastic
-    e = state.void_ratio
+    e = np.minimum((1.0 + state.void_ratio) * np.exp(-state.gap) - 1.0, 1.5)  # without the gap
     p = np.maximum(mean(state.stress) / material.reference_pressure, material.open_pressure)
     density = 3.0 / (2.0 * np.pi) * (13.28 - 8.0 * e) / (1.0 + e)
     normal = 0.5 * compliance / np.sqrt(3.0 * p / density) * 9.0 / density

@@ -4,7 +4,7 @@ import numpy as np
 
 from .. import status
 from ..lanes import kernel, spot
-from .balance import FLOOR, contact_density
+from .balance import FLOOR, MAX_VOID_RATIO, contact_density
 from .history import start_force
 from .iteration import begin
 from .pool import EVALUATIONS, POINT, SUBSTEPS
@@ -18,13 +18,14 @@ from .rows import (
     FULL,
     OLD,
     PORTION,
+    RAISING,
     SHARE,
     VOID,
     VOID_START,
     Y,
 )  # fmt: skip
 
-MAX_VOID_RATIO = 1.64  #: the contact density ∝ 13.28 − 8 e stays positive
+LOOSEST = 1.5  #: void ratio for the stabilising tangent of a point, at most
 
 
 @kernel
@@ -83,12 +84,14 @@ def load(constants, rule, pool, data, out, point, l):
     start = (1.0 + void_ratio[point]) * np.exp(-closing * volume) - 1.0
     rows[spot(OLD + VOID, l)], rows[spot(VOID_START, l)], rows[spot(CLOSING, l)] = start, start, closing
     rows[spot(FRACTION, l)], rows[spot(PORTION, l)], rows[spot(ERROR, l)] = 0.0, 1.0, 0.0
-    rows[spot(SHARE, l)] = 1.0
+    rows[spot(SHARE, l)], rows[spot(RAISING, l)] = 1.0, 0.0
     total += load_contacts(constants, rule, pool, slip, force, point, l)
     if not (np.isfinite(total) and stress[point, 0] + stress[point, 1] + stress[point, 2] > 0.0):
         return report(pool, out, status.BAD_INPUT, l)
     end = (1.0 + void_ratio[point]) * np.exp(-volume) - 1.0
-    if not (FLOOR < end < MAX_VOID_RATIO and FLOOR < void_ratio[point] < MAX_VOID_RATIO):
+    closed = (1.0 + void_ratio[point]) * np.exp(-gap[point]) - 1.0
+    # a gap is no part of the packing; one that expands beyond the range may open on the way
+    if not (end > FLOOR and FLOOR < closed < MAX_VOID_RATIO):
         return report(pool, out, status.VOID_RATIO_RANGE, l)
     start_force(rows, constants.total, l)
     if closing == 1.0:
@@ -111,7 +114,7 @@ def report(pool, out, code, l):
 @kernel
 def elastic_open(constants, rows, tangent, point, l):
     """Write the tangent of an open point: its stress is constant, so this is a stabilisation and has a name."""
-    density = contact_density(rows[spot(OLD + VOID, l)])[0]
+    density = contact_density(min(rows[spot(OLD + VOID, l)], LOOSEST))[0]
     compliance, ease_t, _ = constants.elastic
     normal = 4.5 * compliance / np.sqrt(3.0 * constants.open_pressure / density) / density
     bulk, shear = 1.0 / normal, 1.0 / (normal * (2.0 / 15.0 + ease_t / 5.0))
@@ -141,7 +144,7 @@ def open_point(constants, rule, pool, out, before, l):
         slip[point, a] = pool.slide[spot(a, l)]
         if not constants.total:
             for i in range(3):
-                force[point, a, i] = 3.0 * p / contact_density(void_ratio[point])[0] * rule.normals[a, i]
+                force[point, a, i] = 3.0 * p / contact_density(rows[spot(OLD + VOID, l)])[0] * rule.normals[a, i]
     elastic_open(constants, rows, tangent, point, l)
     report(pool, out, status.OK, l)
 

@@ -20,6 +20,7 @@ _COUNTS = {
     "TAKEN": 1,  # whether the trial evaluated last was accepted
     "FRESH": 1,  # whether the sub-step has just begun
     "FACTOR": 1,  # part of the Newton step in the trial
+    "RAISING": 1,  # whether the share is being raised to 1 in this sub-step; 2 where that failed
     "BASE": 3,  # the force of the plane that does not come from Z
     # states and unknowns
     "Y": 13,  # trial end of the step: stress, fabric, void ratio
@@ -87,7 +88,7 @@ ROWS = sum(_COUNTS.values())
 
 FORCE, FORCE_OLD, FRICTION, DILATANCY = (_STARTS[k] for k in ("FORCE", "FORCE_OLD", "FRICTION", "DILATANCY"))
 FABRIC_MIDDLE, MARGIN, SHARE, BASE = (_STARTS[k] for k in ("FABRIC_MIDDLE", "MARGIN", "SHARE", "BASE"))
-TAKEN, FRESH = _STARTS["TAKEN"], _STARTS["FRESH"]
+TAKEN, FRESH, RAISING = _STARTS["TAKEN"], _STARTS["FRESH"], _STARTS["RAISING"]
 Y, OLD, ACCEPTED, STEP, FULL, PART = (_STARTS[k] for k in ("Y", "OLD", "ACCEPTED", "STEP", "FULL", "PART"))
 INVERSE, SCALED, BY_FABRIC, BY_VOID = (_STARTS[k] for k in ("INVERSE", "SCALED", "BY_FABRIC", "BY_VOID"))
 P_FRICTION, P_DILATANCY = _STARTS["P_FRICTION"], _STARTS["P_DILATANCY"]

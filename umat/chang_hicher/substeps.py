@@ -13,9 +13,9 @@ import numpy as np
 from .. import status
 from ..fabric.law import active_inputs
 from ..lanes import kernel, spot
-from .balance import FLOOR, critical_void_ratio
+from .balance import FLOOR, MAX_VOID_RATIO, critical_void_ratio
 from .history import advance, assign, carried, clear, density, law_carried
-from .iteration import begin, correct, take_step
+from .iteration import again, begin, correct, take_step
 from .points import finish, mean_force, old_pressure, open_point, report
 from .pool import CODE, EQUILIBRIUM, EVALUATIONS, ITERATE, SUBSTEPS
 from .rows import (
@@ -28,7 +28,9 @@ from .rows import (
     FRACTION,
     OLD,
     PORTION,
+    RAISING,
     SHARE,
+    STEP,
     STRESS_ERROR,
     STRESS_NORM,
     TANGENT,
@@ -37,6 +39,7 @@ from .rows import (
 )  # fmt: skip
 
 RELAXABLE = 2.0**-7  #: greatest fraction of an increment for a relaxed sub-step
+FIRST_SHARE, RAISE = 0.0625, 2.0
 SMALLEST = 2.0**-14  #: least fraction of an increment
 CROSSING = 2.0**-6  #: greatest fraction in which a point may open
 STRESS_FLOOR = 1e-3  #: of p_ref; below it the error of the stress is not relative
@@ -96,6 +99,8 @@ def next_substep(constants, rule, pool, error, l):
         pool.small, l,
     )  # fmt: skip
     assign(pool.change[l], pool.new_change)
+    for i in range(12):
+        rows[spot(STEP + i, l)] = rows[spot(Y + i, l)] - rows[spot(OLD + i, l)]
     for i in range(13):
         rows[spot(OLD + i, l)] = rows[spot(Y + i, l)]
     for i in range(9):
@@ -104,12 +109,15 @@ def next_substep(constants, rule, pool, error, l):
         pool.slide[spot(a, l)] = pool.slide[spot(count + a, l)]
     portion = rows[spot(PORTION, l)]
     rows[spot(SHARE, l)] = min(4.0 * rows[spot(SHARE, l)], 1.0)
+    rows[spot(RAISING, l)] = 0.0 if rows[spot(SHARE, l)] == 1.0 else 2.0
     rows[spot(FRACTION, l)] += portion
     fraction = rows[spot(FRACTION, l)]
     aligned = np.floor(fraction / (2.0 * portion)) * 2.0 * portion == fraction
     if error < 0.2 * constants.tolerance and aligned and fraction + 2.0 * portion <= 1.0:
         rows[spot(PORTION, l)] = 2.0 * portion
     begin(pool, l)
+    for i in range(12):
+        rows[spot(Y + i, l)] += rows[spot(PORTION, l)] / portion * rows[spot(STEP + i, l)]
 
 
 @kernel
@@ -120,6 +128,8 @@ def reason(constants, rule, pool, l):
         return status.WORK_LIMIT
     if critical_void_ratio(old_pressure(rows, l), constants.line)[0] < 1.5 * FLOOR:
         return status.PRESSURE_RANGE
+    if rows[spot(Y + VOID, l)] > 0.98 * MAX_VOID_RATIO:
+        return status.VOID_RATIO_RANGE
     least = 1.0
     for a in range(rule.weights.shape[0]):
         n = (rule.normals[a, 0], rule.normals[a, 1], rule.normals[a, 2])
@@ -134,10 +144,18 @@ def cut(constants, rule, pool, out, factor, lost, l):
     lost: no equilibrium was found. Short sub-steps without one are relaxed: see the module's docstring.
     """
     rows = pool.rows
+    if lost and rows[spot(RAISING, l)] == 0.0:
+        rows[spot(RAISING, l)], rows[spot(SHARE, l)] = 1.0, FIRST_SHARE
+        if pool.counts[EVALUATIONS, l] < constants.max_evaluations:
+            begin(pool, l)
+            return False
+    if rows[spot(RAISING, l)] == 1.0:
+        rows[spot(RAISING, l)], rows[spot(SHARE, l)] = 2.0, 1.0
     if lost and rows[spot(PORTION, l)] <= RELAXABLE and 0.25 * rows[spot(SHARE, l)] >= constants.least_share:
         rows[spot(SHARE, l)] *= 0.25
     else:
         rows[spot(PORTION, l)] *= factor
+        rows[spot(RAISING, l)] = 0.0
     if rows[spot(PORTION, l)] >= SMALLEST and pool.counts[EVALUATIONS, l] < constants.max_evaluations:
         begin(pool, l)
         return False
@@ -174,6 +192,10 @@ def settle(constants, components, rule, pool, strain, out, l):
     if pool.counts[CODE, l] != EQUILIBRIUM:
         return cut(constants, rule, pool, out, 0.25, True, l)
     correct(pool, components, constants.evolving, l)
+    if rows[spot(RAISING, l)] == 1.0 and rows[spot(SHARE, l)] < 1.0:
+        rows[spot(SHARE, l)] *= RAISE
+        again(pool, l)
+        return False
     p = (rows[spot(Y, l)] + rows[spot(Y + 1, l)] + rows[spot(Y + 2, l)]) / 3.0
     if p < constants.open_pressure:
         return opening(constants, rule, pool, out, p, l)
