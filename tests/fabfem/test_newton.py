@@ -16,10 +16,18 @@ from fabfem.space import build_space
 from fabfem.stages import Stage
 from fabfem.supports import Support
 from umat import MohrCoulomb, VonMises, initial_state
+from umat.directions import directions
+from umat.sands import toyoura
 
 MATERIALS = {
     "von_mises": (VonMises(1e4, 0.3, 30.0, 100.0), None, {}, 0.03),
     "mohr_coulomb": (MohrCoulomb(1e4, 0.3, cohesion=2.0, friction_angle=30.0, dilation_angle=10.0), None, {}, 0.03),
+    "chang_hicher": (
+        toyoura(),
+        directions("bazant_oh_37"),
+        {"void_ratio": 0.8, "fabric": [-0.08, 0.16, -0.08, 0.0, 0.0, 0.0]},
+        0.004,
+    ),
 }
 """Material, directions, what its initial state needs besides an isotropic 50 kPa, and settlement of the footing."""
 
@@ -38,12 +46,12 @@ def ground() -> Mesh:
 
 def footing(name: str, **controls: float) -> Model:
     """A rigid rough footing pushed into the ground in four increments."""
-    material, directions, needs, settlement = MATERIALS[name]
+    material, rule, needs, settlement = MATERIALS[name]
     space = build_space(ground(), KINEMATICS["plane_strain"])
-    state = initial_state(material, directions, np.tile([50.0, 50.0, 50.0, 0, 0, 0], (space.npoints, 1)), **needs)
+    state = initial_state(material, rule, np.tile([50.0, 50.0, 50.0, 0, 0, 0], (space.npoints, 1)), **needs)
     held = (*FIXED, Support("footing", "x"), Support("footing", "y", -settlement))
     stage = Stage("push", held, PRESSED, first=0.25, largest=0.25)
-    return Model(space, {"all": Zone(material, directions, state, slice(None))}, (stage,), Controls(**controls))
+    return Model(space, {"all": Zone(material, rule, state, slice(None))}, (stage,), Controls(**controls))
 
 
 def orders(residuals: tuple[float, ...]) -> list[float]:

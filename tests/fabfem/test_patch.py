@@ -21,7 +21,9 @@ from fabfem.space import Space, build_space
 from fabfem.stages import Stage
 from fabfem.supports import Support
 from umat import DruckerPrager, Elastic, MohrCoulomb, VonMises, elastic_tangent, initial_state, update
+from umat.directions import directions
 from umat.mandel import from_tensor
+from umat.sands import toyoura
 
 SOLIDS = [(e, "solid", n) for e, row in ELEMENTS.items() if row.dim == 3 for n in row.rules]
 FLAT = [
@@ -41,11 +43,13 @@ HOMOGENEOUS = {
 }
 """Displacement gradients whose stress, in an isotropic material, is in equilibrium without body force."""
 
+SAND = (toyoura(), directions("bazant_oh_37"), {"void_ratio": 0.75, "fabric": [-0.08, 0.16, -0.08, 0, 0, 0]})
 MATERIALS = {
     "elastic": (Elastic(1e4, 0.3), None, {}),
     "von_mises": (VonMises(1e4, 0.3, 60.0, 500.0), None, {}),
     "drucker_prager": (DruckerPrager(1e4, 0.3, friction_slope=1.0, dilation_slope=0.3, strength=10.0), None, {}),
     "mohr_coulomb": (MohrCoulomb(1e4, 0.3, cohesion=5.0, friction_angle=30.0, dilation_angle=10.0), None, {}),
+    "chang_hicher": SAND,
 }
 """Material, directions, what its initial state needs besides an isotropic 100 kPa."""
 
@@ -115,6 +119,32 @@ def test_patch_of_constant_strain(cell_type: str, kinematics: str, points: int) 
 
 
 @every_space
+def test_patch_of_sliding_contacts(cell_type: str, kinematics: str, points: int) -> None:
+    """The same with the enhanced Chang–Hicher model, sliding, by Newton from a disturbed field."""
+    material, rule, needs = SAND
+    space = space_of(cell_type, kinematics, points)
+    gradient = -5e-4 * np.array(HOMOGENEOUS[kinematics])
+    exact = linear_field(space, gradient)
+    ncomp = len(space.components)
+    nodes = np.unique(np.concatenate([b.ravel() for b in space.mesh.boundaries.values()]))
+    free = np.setdiff1d(np.arange(space.ndof), (nodes[:, None] * ncomp + np.arange(ncomp)).ravel())
+    pattern, old = find_pattern(space.dofs, space.ndof), start(space.npoints, *SAND)
+    u = exact.copy()
+    u[free] += 1e-5 * np.random.default_rng(3).uniform(-1.0, 1.0, len(free))
+    for _ in range(12):
+        answer = update(material, rule, space.strain(u), old)
+        assert not answer.status.any()
+        force = space.internal_force(answer.stress)
+        matrix = stiffness(space, pattern, answer.tangent).tocsc()
+        u[free] -= spsolve(matrix[free][:, free], force[free])
+    np.testing.assert_allclose(u, exact, rtol=0, atol=1e-12)
+    alone = update(material, rule, exact_strain(space, gradient)[:1], start(1, *SAND))
+    assert (alone.state.slip > old.slip[0]).sum() > 5
+    np.testing.assert_allclose(answer.stress, np.broadcast_to(alone.stress, answer.stress.shape), atol=1e-8)
+    assert needs["void_ratio"] != alone.state.void_ratio[0]
+
+
+@every_space
 def test_constant_stress_is_in_balance_inside(cell_type: str, kinematics: str, points: int) -> None:
     space = space_of(cell_type, kinematics, points)
     stress = np.tile(
@@ -150,24 +180,24 @@ COMPRESSIONS = [
 def test_one_element_equals_the_stress_point(
     name: str, cell_type: str, kinematics: str, fixed: tuple[str, ...], moved: dict[str, float]
 ) -> None:
-    material, directions, needs = MATERIALS[name]
+    material, rule, needs = MATERIALS[name]
     dim = ELEMENTS[cell_type].dim
     space = build_space(box_mesh(cell_type, (1,) * dim, (0.0,) * dim, (1.0,) * dim), KINEMATICS[kinematics])
     normal = {side: space.components[axis] for axis, pair in enumerate(SIDES[dim]) for side in pair}
     supports = [Support(side, normal[side], moved.get(side, 0.0)) for side in (*fixed, *moved)]
     supports += [Support("bottom", c) for c in space.components if c == "theta"]
-    zone = Zone(material, directions, start(space.npoints, material, directions, needs), slice(None))
+    zone = Zone(material, rule, start(space.npoints, material, rule, needs), slice(None))
     stage = Stage("compression", tuple(supports), first=0.25, largest=0.25)
-    alone = start(1, material, directions, needs)
+    alone = start(1, material, rule, needs)
     for step in run(Model(space, {"all": zone}, (stage,), Controls(tolerance=1e-13))):
-        alone = update(material, directions, step.size * unit_box_strain(space, moved), alone).state
+        alone = update(material, rule, step.size * unit_box_strain(space, moved), alone).state
         expected = np.broadcast_to(alone.stress, (space.npoints, 6))
         np.testing.assert_allclose(step.states["all"].stress, expected, rtol=1e-10, atol=1e-8)
 
 
-def start(n: int, material: Any, directions: Any, needs: dict) -> Any:
+def start(n: int, material: Any, rule: Any, needs: dict) -> Any:
     """State of `n` points under 100 kPa."""
-    return initial_state(material, directions, np.tile([100.0, 100.0, 100.0, 0.0, 0.0, 0.0], (n, 1)), **needs)
+    return initial_state(material, rule, np.tile([100.0, 100.0, 100.0, 0.0, 0.0, 0.0], (n, 1)), **needs)
 
 
 def unit_box_strain(space: Space, moved: dict[str, float]) -> np.ndarray:
