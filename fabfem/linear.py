@@ -4,6 +4,7 @@ A failure is a value: `solve` never raises and never hands on NaN. PARDISO (the 
 analysis while the pattern stays; SuperLU needs nothing but scipy.
 """
 
+import os
 from importlib.util import find_spec
 from typing import Any, NamedTuple, Protocol
 from weakref import finalize
@@ -149,6 +150,8 @@ class PardisoBackend:
     name = "pardiso"
 
     def __init__(self, symmetric: bool = False) -> None:
+        # MKL's sums may differ from run to run unless it is told otherwise before it starts
+        os.environ.setdefault("MKL_CBWR", "AUTO")
         from pypardiso import PyPardisoSolver
 
         self._solver = PyPardisoSolver(mtype=-2 if symmetric else 1)

@@ -85,7 +85,7 @@ def substeps(material: Any, rule: Directions, cases: Cases) -> np.ndarray:
     counts = np.zeros(n, np.int8), np.zeros(n), np.zeros(n, np.int32), np.zeros(n, np.int32)
     out = (*(np.array(a) for a in data[:6]), np.zeros((n, 6, 6)), *counts)
     pool = make_pool(len(padded.weights), constants.total)
-    integrate(material.law, constants, padded, terms(rule.symmetry == "quarter"), pool, data, out, 0, n)
+    integrate(material.law, constants, padded, terms(rule.symmetry == "quarter"), pool, data, out, np.arange(n))
     return counts[3]
 
 

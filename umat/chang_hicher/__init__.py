@@ -23,8 +23,9 @@ from ..interface import (
     symmetric_tangent,
     update,
 )
-from ..mandel import Array
-from ..threads import map_slices
+from ..lanes import LANES
+from ..mandel import Array, norm
+from ..threads import get_threads, map_slices
 from .integrate import integrate
 from .material import ChangHicher, ChangHicherState, constants_of, elastic, fields, rule_of, start
 from .planes import terms
@@ -33,7 +34,6 @@ from .pool import make_pool
 __all__ = ["ChangHicher", "ChangHicherState"]
 
 _local = threading.local()
-SLICE = 512  #: points that share a pool; fixed, so that results do not depend on the number of threads
 
 
 def _pool(n_directions: int, total: bool) -> Any:
@@ -57,12 +57,19 @@ def _(material: ChangHicher, directions: Directions, strain_increment: ArrayLike
     work, substeps = np.zeros(n, np.int32), np.zeros(n, np.int32)
     out = (stress, fabric, void_ratio, slip, force, gap, tangent, codes, errors, work, substeps)
 
+    # large increments take longest: they start first, and each thread has its part of them. No lane reads another, so
+    # which points lie side by side does not matter to any.
+    order = np.argsort(-norm(strain), kind="stable")
+    parts = max(min(get_threads(), n // LANES), 1)
+
     def kernel(begin: int, end: int) -> None:
         pool = _pool(len(rule.weights), constants.total)
         with np.errstate(all="ignore"):  # lanes outside the domain are computed too, and left alone
-            integrate(material.law, constants, rule, products, pool, data, out, begin, end)
+            for part in range(begin, end):
+                mine = np.ascontiguousarray(order[part::parts])
+                integrate(material.law, constants, rule, products, pool, data, out, mine)
 
-    map_slices(kernel, n, SLICE)
+    map_slices(kernel, parts, 1)
     stress *= material.reference_pressure
     tangent *= material.reference_pressure
     refused = codes != status.OK

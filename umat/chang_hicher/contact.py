@@ -11,6 +11,9 @@ normal force and the tangential force vector, R = |f_t| / f_n, and `o` the start
   (in a relaxed sub-step only a share of λ_req − λ_o, see `integrate`)
 * its displacement, direction and dilatancy taken at the middle force f_m = (f + f_o)/2 (second order):
   δᵖ = (λ − λ_o) [t_m + (tanφ_d − R_m) n].
+
+With room = tanφ_p f_n − f_t, λ_req = push tanφ_p / room. Its slope is taken as (d(push tanφ_p) − λ̂ d room) / room, the
+exact one for λ̂ = λ_req; λ̂ is the sliding that the last linear step foresaw, where that was another (`docs/theory.md`).
 """
 
 import numpy as np
@@ -113,7 +116,7 @@ def contact_plane(rows, before, after, kept, tried, out, n, weight, elastic, wid
         slip = share * np.maximum(required - done, 0.0)
         on = select(required > done, share, 0.0)
         after[l] = done + slip
-        # the slope is that of λ room = push · tanφ_p at an estimate of λ: see the module's docstring
+        # the sliding that the last linear step foresaw; `kept` is where it began
         taken = rows[at(TAKEN, l)] > 0.5
         k_room = select(taken, tried[at(0, l)], kept[at(0, l)])
         k_required = select(taken, tried[at(1, l)], kept[at(1, l)])

@@ -80,12 +80,12 @@ def evaluate(law, constants, rule, terms, pool, width):
 
 
 @kernel
-def fill(constants, rule, pool, data, out, following, stop, l):
-    """Give a lane the next point that can be tried; return the number of the point after it."""
+def fill(constants, rule, pool, data, out, order, following, l):
+    """Give a lane the next point that can be tried; return the place in the order after it."""
     pool.counts[CODE, l] = IDLE
-    while following < stop:
+    while following < order.shape[0]:
         following += 1
-        if load(constants, rule, pool, data, out, following - 1, l):
+        if load(constants, rule, pool, data, out, order[following - 1], l):
             pool.counts[CODE, l] = TRIAL
             break
     return following
@@ -133,12 +133,12 @@ def move(pool, source, target):
 
 
 @entry
-def integrate(law, constants, rule, terms, pool, data, out, start, stop):
-    """Integrate the points start…stop-1; see the module's docstring."""
+def integrate(law, constants, rule, terms, pool, data, out, order):
+    """Integrate the points of `order`, one after another as lanes become free; see the module's docstring."""
     components, count = terms.components, pool.counts
-    following, held = start, 0
-    while held < LANES and following < stop:
-        following = fill(constants, rule, pool, data, out, following, stop, held)
+    following, held = 0, 0
+    while held < LANES and following < order.shape[0]:
+        following = fill(constants, rule, pool, data, out, order, following, held)
         held += count[CODE, held] != IDLE
     while held > 0:
         # lanes in use lie side by side at the front; the few beyond them fill the vector
@@ -155,7 +155,7 @@ def integrate(law, constants, rule, terms, pool, data, out, start, stop):
         for l in range(held - 1, -1, -1):
             if count[CODE, l] > TRIAL:
                 if settle(constants, components, rule, pool, data[6], out, l):
-                    following = fill(constants, rule, pool, data, out, following, stop, l)
+                    following = fill(constants, rule, pool, data, out, order, following, l)
                 else:
                     count[CODE, l] = TRIAL
             if count[CODE, l] == IDLE:

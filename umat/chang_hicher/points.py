@@ -20,6 +20,7 @@ from .rows import (
     PORTION,
     RAISING,
     SHARE,
+    STEP,
     VOID,
     VOID_START,
     Y,
@@ -94,6 +95,8 @@ def load(constants, rule, pool, data, out, point, l):
     if not (end > FLOOR and FLOOR < closed < MAX_VOID_RATIO):
         return report(pool, out, status.VOID_RATIO_RANGE, l)
     start_force(rows, constants.total, l)
+    for i in range(12):
+        rows[spot(STEP + i, l)] = 0.0  # of the components that vanish nothing else is written
     if closing == 1.0:
         out[2][point], out[5][point] = end, gap[point] - volume
         elastic_open(constants, rows, out[6], point, l)
