@@ -1,9 +1,9 @@
 """The fabric-enhanced Chang–Hicher micromechanical model, one stress point and many.
 
 `material` parameters and state, `contact` one contact plane, `balance` the averages over planes, `residual` the
-equations of a step, `elimination` their linear systems, `history` the chain of sub-steps, `integrate` the step
-control of each point, `rows` and `pool` storage, `planes` directions and what is summed over them. The derivation is
-in `docs/theory.md`.
+equations of a step, `elimination` their linear systems, `history` the chain of sub-steps, `iteration` Newton's steps
+of a sub-step, `substeps` their error and size, `points` the way in and out, `integrate` the loop over all, `rows` and
+`pool` storage, `planes` directions and what is summed over them. The derivation is in `docs/theory.md`.
 """
 
 import threading
