@@ -62,7 +62,6 @@ class FieldFiles:
         self.note = note.replace("--", "-")
         self._geometry = _geometry(points, cells, cell_type)
         self._stored: list[tuple[float, str]] = []
-        write_atomic(folder / "fields.pvd", self._collection())
 
     def write(self, frame: Frame) -> Path:
         """Store a frame and list it in the collection; return its file."""
