@@ -36,7 +36,8 @@ ROWS: dict[str, dict[str, str]] = {
     "point tolerance 1e-4": {"open_pressure": "1e-3\ntolerance = 1e-4"},
     "open pressure 1e-4": {"open_pressure": "1e-4"},
     "no point held": {"held": "0.0"},
-    "increments 1 %": {"increments": "{ initial = 0.01, minimum = 1e-5, maximum = 0.01 }"},
+    "increments 2 %": {"increments": "{ initial = 0.01, minimum = 1e-5, maximum = 0.02 }"},
+    "increments 0.5 %": {"increments": "{ initial = 0.005, minimum = 1e-5, maximum = 0.005 }"},
 }
 """Keys of the case and their values."""
 
