@@ -62,21 +62,20 @@ def _solve(options: argparse.Namespace) -> int:
 
 def _check(options: argparse.Namespace) -> int:
     from fabfem.case import read_case, resolved
-    from fabfem.omitted import remaining
     from fabfem.output.progress import summary
-    from fabfem.problem import build
+    from fabfem.run import describe_case
 
     case = read_case(options.case)
-    problem = build(case)
+    description = describe_case(case)
     if not options.quiet:
         print(resolved(case))
-        print("# What the scene leaves out:", *problem.omitted, sep="\n#   ")
-        print("# What remains:\n" + summary(list(remaining(problem.model)), prefix="#   "))
+        print("# What the scene leaves out:", *description.omitted, sep="\n#   ")
+        print("# What remains:\n" + summary(description.remains, prefix="#   "))
     return DONE
 
 
 def _show(options: argparse.Namespace) -> int:
-    from fabfem.show import show
+    from fabfem.pictures.show import show
 
     shown = show(options.folder)
     if not options.quiet:

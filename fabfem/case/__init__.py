@@ -4,10 +4,21 @@ A case is a tree of frozen tables with all defaults filled in. Nothing here know
 names that only those can vouch for are checked when the problem is built, with the same kind of sentence.
 """
 
+from fabfem.case.boundary_value import BoundaryValueCase
 from fabfem.case.names import boundaries_of
 from fabfem.case.reader import case_from, read_case, resolved
 from fabfem.case.schema import Case
 from fabfem.case.sentences import CaseError
 from fabfem.case.table import nearest, suggest
 
-__all__ = ["Case", "CaseError", "boundaries_of", "case_from", "nearest", "read_case", "resolved", "suggest"]
+__all__ = [
+    "BoundaryValueCase",
+    "Case",
+    "CaseError",
+    "boundaries_of",
+    "case_from",
+    "nearest",
+    "read_case",
+    "resolved",
+    "suggest",
+]

@@ -3,13 +3,13 @@
 from collections import Counter
 from collections.abc import Iterator
 
+from fabfem.case.boundary_value import BoundaryValueCase
 from fabfem.case.materials import ChangHicher
-from fabfem.case.schema import Case
 from fabfem.case.stages import COMPONENTS, Geostatic, Load, Vector
 from fabfem.case.table import suggest
 
 
-def contradictions(case: Case) -> Iterator[tuple[str, str]]:
+def contradictions(case: BoundaryValueCase) -> Iterator[tuple[str, str]]:
     """Yield (place, what) for what no single table can see."""
     yield from _unknown_components(case)
     yield from _repeated_names(case)
@@ -17,7 +17,7 @@ def contradictions(case: Case) -> Iterator[tuple[str, str]]:
     yield from _odd_columns(case)
 
 
-def _odd_columns(case: Case) -> Iterator[tuple[str, str]]:
+def _odd_columns(case: BoundaryValueCase) -> Iterator[tuple[str, str]]:
     columns = _recorded(case)
     for derived in case.derived:
         where = f"derived[{derived.name}]"
@@ -30,7 +30,7 @@ def _odd_columns(case: Case) -> Iterator[tuple[str, str]]:
             yield f"probe[{probe.name}]", "needs either a boundary or a point"
 
 
-def _impossible_together(case: Case) -> Iterator[tuple[str, str]]:
+def _impossible_together(case: BoundaryValueCase) -> Iterator[tuple[str, str]]:
     for stage in case.stage[1:]:
         if isinstance(stage, Geostatic):
             yield f"stage[{stage.name}].kind", "a geostatic stage must be the first"
@@ -42,14 +42,14 @@ def _impossible_together(case: Case) -> Iterator[tuple[str, str]]:
             yield f"material.{name}.fabric.bedding_angle", "must be 0: inclined bedding has no axis of symmetry"
 
 
-def _unknown_components(case: Case) -> Iterator[tuple[str, str]]:
+def _unknown_components(case: BoundaryValueCase) -> Iterator[tuple[str, str]]:
     valid = COMPONENTS[case.scene.kinematics]
     for where, component in _components(case):
         if component not in valid:
             yield where, f"'{component}' is no component of {case.scene.kinematics}; it has {', '.join(valid)}"
 
 
-def _components(case: Case) -> Iterator[tuple[str, str]]:
+def _components(case: BoundaryValueCase) -> Iterator[tuple[str, str]]:
     for number, support in enumerate(case.support, 1):
         yield from ((f"support[{number}].fix", component) for component in support.fix)
     yield from ((f"probe[{probe.name}].component", probe.component) for probe in case.probe)
@@ -63,7 +63,7 @@ def _components(case: Case) -> Iterator[tuple[str, str]]:
                 yield from ((f"stage[{stage.name}].{kind}[{number}]", name) for name in vector.components())
 
 
-def _repeated_names(case: Case) -> Iterator[tuple[str, str]]:
+def _repeated_names(case: BoundaryValueCase) -> Iterator[tuple[str, str]]:
     lists = {
         "stage": [stage.name for stage in case.stage],
         "probe, reaction or derived": [*_recorded(case), *(derived.name for derived in case.derived)],
@@ -74,6 +74,6 @@ def _repeated_names(case: Case) -> Iterator[tuple[str, str]]:
                 yield kind, f"the name '{name}' is given {count} times"
 
 
-def _recorded(case: Case) -> list[str]:
+def _recorded(case: BoundaryValueCase) -> list[str]:
     """Return the names of all probes and reactions."""
     return [*(probe.name for probe in case.probe), *(entry.name for entry in case.reaction)]

@@ -2,11 +2,11 @@
 
 from collections.abc import Iterator
 
-from fabfem.case.schema import Case
+from fabfem.case.boundary_value import BoundaryValueCase
 from fabfem.case.stages import Displacement, Load, Pressure, Traction
 
 
-def boundaries_of(case: Case) -> Iterator[tuple[str, tuple[str, ...]]]:
+def boundaries_of(case: BoundaryValueCase) -> Iterator[tuple[str, tuple[str, ...]]]:
     """Yield (place, names) wherever a case names boundaries."""
     yield from ((f"support[{number}].boundary", support.boundary) for number, support in enumerate(case.support, 1))
     for stage in case.stage:

@@ -1,16 +1,23 @@
 """The strict reader: TOML file to `Case`, or one sentence on what is wrong and where."""
 
 import tomllib
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
 from pydantic import ValidationError
 
+from fabfem.case.boundary_value import BoundaryValueCase
 from fabfem.case.contradictions import contradictions
 from fabfem.case.schema import Case
 from fabfem.case.sentences import CaseError, sentence
 from fabfem.case.table import suggest
 from fabfem.case.toml import write_toml
+
+KINDS: dict[str, tuple[type[Case], Callable[[Any], Iterator[tuple[str, str]]]]] = {
+    "boundary_value": (BoundaryValueCase, contradictions),
+}
+"""What a case of each kind of scene may say, and the search for what no single table can see."""
 
 
 def read_case(path: str | Path) -> Case:
@@ -33,14 +40,27 @@ def read_case(path: str | Path) -> Case:
 def case_from(tables: dict[str, Any], path: str | Path = "case.toml") -> Case:
     """Return the case made of tables that were read already; relative files are looked up beside ``path``."""
     path = Path(path)
+    schema, contradicted = KINDS[_kind(tables, path)]
     try:
-        case = Case.model_validate(tables)
+        case = schema.model_validate(tables)
     except ValidationError as error:
         raise CaseError(f"{path.name}: {sentence(error, tables)}") from error
     case._path = path
-    for where, what in contradictions(case):
+    for where, what in contradicted(case):
         raise CaseError(f"{path.name}: {where}: {what}")
     return case
+
+
+def _kind(tables: dict[str, Any], path: Path) -> str:
+    """Return the kind of scene; where none is said, the schema of a boundary-value problem says what is missing."""
+    scene = tables.get("scene")
+    kind = scene.get("kind") if isinstance(scene, dict) else None
+    if kind is None:
+        return "boundary_value"
+    if kind not in KINDS:
+        known = ", ".join(f"'{name}'" for name in KINDS)
+        raise CaseError(f"{path.name}: scene.kind: must be one of {known} (got {kind!r}){suggest(str(kind), KINDS)}")
+    return kind
 
 
 def resolved(case: Case) -> str:

@@ -15,12 +15,12 @@ import numpy as np
 import skfem
 from scipy.sparse import csr_matrix
 
-from fabfem.assembly import find_pattern, stiffness
-from fabfem.box import box_mesh
-from fabfem.kinematics import KINEMATICS
-from fabfem.linear import make_solver, norm
-from fabfem.space import Space, build_space
-from fabfem.supports import Support, constrain, reduction
+from fabfem.fem.assembly import find_pattern, stiffness
+from fabfem.fem.box import box_mesh
+from fabfem.fem.kinematics import KINEMATICS
+from fabfem.fem.linear import make_solver, norm
+from fabfem.fem.space import Space, build_space
+from fabfem.fem.supports import Support, constrain, reduction
 from umat import Elastic, elastic_tangent, initial_state
 
 

@@ -16,9 +16,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from fabfem.boundary_value.problem import build
 from fabfem.case import read_case
-from fabfem.problem import build
-from fabfem.solve import Stopped, march, reaction
+from fabfem.fem.solve import Stopped, march, reaction
 
 CASE = Path(__file__).parents[2] / "cases" / "footing" / "strip_toyoura.toml"
 MEASURED = CASE.with_name("toyoura_footing_centrifuge.csv")

@@ -5,11 +5,11 @@ import pytest
 import skfem
 from scipy.sparse import csr_matrix
 
-from fabfem.assembly import find_pattern, stiffness
-from fabfem.box import box_mesh
-from fabfem.kinematics import KINEMATICS
-from fabfem.loads import Gravity, Pressure, Traction, nodal_force
-from fabfem.space import Space, build_space
+from fabfem.fem.assembly import find_pattern, stiffness
+from fabfem.fem.box import box_mesh
+from fabfem.fem.kinematics import KINEMATICS
+from fabfem.fem.loads import Gravity, Pressure, Traction, nodal_force
+from fabfem.fem.space import Space, build_space
 from umat.mandel import from_tensor
 
 FORMS = {

@@ -6,11 +6,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from fabfem.boundary_value.problem import build
 from fabfem.case import case_from, read_case
 from fabfem.case.materials import Fabric
-from fabfem.loads import Gravity, Pressure
-from fabfem.problem import build
-from fabfem.zones import deposit, rule_for
+from fabfem.fem.loads import Gravity, Pressure
+from fabfem.substance import deposit, rule_for
 from umat.directions import directions
 from umat.mandel import norm, to_tensor, trace
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.sparse import csr_matrix, diags, random_array
 
-from fabfem.linear import DirectSolver, PardisoBackend, SuperLUBackend, make_solver
+from fabfem.fem.linear import DirectSolver, PardisoBackend, SuperLUBackend, make_solver
 
 needs_pardiso = pytest.mark.skipif(find_spec("pypardiso") is None, reason="pypardiso is not installed")
 SOLVERS = {"superlu": lambda: DirectSolver(SuperLUBackend()), "pardiso": lambda: DirectSolver(PardisoBackend())}

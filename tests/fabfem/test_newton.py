@@ -6,15 +6,15 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from fabfem.box import box_mesh
-from fabfem.kinematics import KINEMATICS
-from fabfem.loads import Pressure
-from fabfem.mesh import Mesh, outer_facets
-from fabfem.model import Controls, Model, Refusal, Zone, update_points
-from fabfem.solve import Increment, march
-from fabfem.space import build_space
-from fabfem.stages import Stage
-from fabfem.supports import Support
+from fabfem.fem.box import box_mesh
+from fabfem.fem.kinematics import KINEMATICS
+from fabfem.fem.loads import Pressure
+from fabfem.fem.mesh import Mesh, outer_facets
+from fabfem.fem.model import Controls, Model, Refusal, Zone, update_points
+from fabfem.fem.solve import Increment, march
+from fabfem.fem.space import build_space
+from fabfem.fem.stages import Stage
+from fabfem.fem.supports import Support
 from umat import MohrCoulomb, VonMises, initial_state
 from umat.directions import directions
 from umat.sands import toyoura

@@ -15,16 +15,16 @@ import pytest
 import pyvista
 from vtkmodules.vtkIOXML import vtkXMLUnstructuredGridReader
 
+from fabfem.boundary_value.fields import point_fields
+from fabfem.boundary_value.frame import in_vtk_order
+from fabfem.boundary_value.problem import build
 from fabfem.case import read_case
-from fabfem.fields import point_fields
+from fabfem.fem.solve import Increment, march
 from fabfem.output.atomic import write_atomic
-from fabfem.output.frame import in_vtk_order
 from fabfem.output.history import History, read_history
 from fabfem.output.report import WORST, Report
 from fabfem.output.vtu import CELL_TYPES, FieldFiles, Frame
-from fabfem.problem import build
 from fabfem.run import run_case
-from fabfem.solve import Increment, march
 from umat.mandel import from_tensor
 
 PHASES = {"read", "mesh", "material", "assembly", "linear_solve", "output", "other", "total"}

@@ -10,16 +10,16 @@ import numpy as np
 import pytest
 from scipy.sparse.linalg import spsolve
 
-from fabfem.assembly import find_pattern, stiffness
-from fabfem.box import SIDES, box_mesh
-from fabfem.elements import ELEMENTS, quadrature, shape
-from fabfem.kinematics import KINEMATICS
-from fabfem.mesh import Mesh, outer_facets, quadratic
-from fabfem.model import Controls, Model, Zone
-from fabfem.solve import Increment, march
-from fabfem.space import Space, build_space
-from fabfem.stages import Stage
-from fabfem.supports import Support
+from fabfem.fem.assembly import find_pattern, stiffness
+from fabfem.fem.box import SIDES, box_mesh
+from fabfem.fem.elements import ELEMENTS, quadrature, shape
+from fabfem.fem.kinematics import KINEMATICS
+from fabfem.fem.mesh import Mesh, outer_facets, quadratic
+from fabfem.fem.model import Controls, Model, Zone
+from fabfem.fem.solve import Increment, march
+from fabfem.fem.space import Space, build_space
+from fabfem.fem.stages import Stage
+from fabfem.fem.supports import Support
 from umat import DruckerPrager, Elastic, MohrCoulomb, VonMises, elastic_tangent, initial_state, update
 from umat.directions import directions
 from umat.mandel import from_tensor

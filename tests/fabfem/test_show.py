@@ -8,10 +8,10 @@ import matplotlib.image
 import numpy as np
 import pytest
 
-from fabfem import show as module
 from fabfem.case import CaseError
 from fabfem.cli import NO_PICTURE, main
-from fabfem.show import NO_OPENGL, show
+from fabfem.pictures import show as module
+from fabfem.pictures.show import NO_OPENGL, show
 
 
 @pytest.fixture

@@ -7,15 +7,15 @@ from typing import Any, NamedTuple
 import numpy as np
 import pytest
 
-from fabfem.box import box_mesh
-from fabfem.kinematics import KINEMATICS
-from fabfem.loads import Gravity, Load, Pressure, Traction, k0_stress
-from fabfem.mesh import Mesh, outer_facets, read_mesh
-from fabfem.model import Controls, Model, Zone
-from fabfem.solve import Increment, Stopped, march, reaction
-from fabfem.space import Space, build_space
-from fabfem.stages import Stage
-from fabfem.supports import Support
+from fabfem.fem.box import box_mesh
+from fabfem.fem.kinematics import KINEMATICS
+from fabfem.fem.loads import Gravity, Load, Pressure, Traction, k0_stress
+from fabfem.fem.mesh import Mesh, outer_facets, read_mesh
+from fabfem.fem.model import Controls, Model, Zone
+from fabfem.fem.solve import Increment, Stopped, march, reaction
+from fabfem.fem.space import Space, build_space
+from fabfem.fem.stages import Stage
+from fabfem.fem.supports import Support
 from umat import Elastic, Response, VonMises, elastic_tangent, initial_state, symmetric_tangent, update
 from umat.status import NO_CONVERGENCE, OK
 

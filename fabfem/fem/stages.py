@@ -2,8 +2,8 @@
 
 from dataclasses import dataclass
 
-from fabfem.loads import Load
-from fabfem.supports import Support
+from fabfem.fem.loads import Load
+from fabfem.fem.supports import Support
 
 
 @dataclass(frozen=True)

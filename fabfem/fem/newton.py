@@ -12,10 +12,10 @@ from typing import NamedTuple
 import numpy as np
 from scipy.sparse import csr_matrix
 
-from fabfem.assembly import stiffness
-from fabfem.linear import norm
-from fabfem.model import Controls, Refusal, elastic_tangents
-from fabfem.trial import Equilibrium, System, Task, Trial, attempt, make_task
+from fabfem.fem.assembly import stiffness
+from fabfem.fem.linear import norm
+from fabfem.fem.model import Controls, Refusal, elastic_tangents
+from fabfem.fem.trial import Equilibrium, System, Task, Trial, attempt, make_task
 
 
 class Solved(NamedTuple):
@@ -144,13 +144,13 @@ def _least(system: System, trial: Trial, tried: list[Trial | Refusal]) -> Trial 
 
 
 def _stiffness(system: System, task: Task, tangent: np.ndarray) -> csr_matrix:
-    with system.clock.phase("assembly"):
+    with system.timer.phase("assembly"):
         whole = tangent if task.viscous is None else tangent + task.viscous
         return stiffness(system.space, system.pattern, whole)
 
 
 def _solved(system: System, matrix: csr_matrix, rhs: np.ndarray) -> np.ndarray | Refusal:
-    with system.clock.phase("linear_solve"):
+    with system.timer.phase("linear_solve"):
         system.solver.factor(system.reduce(matrix))
         solution = system.solver.solve(rhs)
     return solution.x if solution.ok else Refusal(solution.reason)

@@ -9,8 +9,8 @@ from functools import singledispatch
 
 import numpy as np
 
-from fabfem.elements import ELEMENTS, quadrature, shape
-from fabfem.space import Space
+from fabfem.fem.elements import ELEMENTS, quadrature, shape
+from fabfem.fem.space import Space
 
 
 @dataclass(frozen=True)

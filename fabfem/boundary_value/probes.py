@@ -7,10 +7,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fabfem.case import Case
-from fabfem.case.schema import Derived, Probe, Reaction
-from fabfem.solve import Increment
-from fabfem.space import Space
+from fabfem.case import BoundaryValueCase
+from fabfem.case.boundary_value import Derived, Probe, Reaction
+from fabfem.fem.solve import Increment
+from fabfem.fem.space import Space
 
 Value = str | int | float
 Measure = Callable[[Increment], float]
@@ -34,7 +34,7 @@ class Column(NamedTuple):
         return f"{self.name} [{self.unit}]" if self.unit else self.name
 
 
-def columns(case: Case, space: Space) -> tuple[Column, ...]:
+def columns(case: BoundaryValueCase, space: Space) -> tuple[Column, ...]:
     """Return the columns of a case's history."""
     units = case.unit_system
     force = units.label("line_force" if case.scene.kinematics == "plane_strain" else "force")

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.sparse import csr_matrix
 
-from fabfem.assembly import Pattern
-from fabfem.space import Space
+from fabfem.fem.assembly import Pattern
+from fabfem.fem.space import Space
 
 
 @dataclass(frozen=True)

@@ -10,15 +10,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fabfem.assembly import Pattern, find_pattern, stiffness
-from fabfem.linear import make_solver, norm
-from fabfem.loads import external_force
-from fabfem.model import Controls, Model, Refusal, States, elastic_tangents, initial_stress
-from fabfem.newton import Solved, solve_increment
-from fabfem.space import Space
-from fabfem.stages import Stage
-from fabfem.supports import constrain, reduction
-from fabfem.trial import Clock, Equilibrium, System, Trial, relative
+from fabfem.fem.assembly import Pattern, find_pattern, stiffness
+from fabfem.fem.linear import make_solver, norm
+from fabfem.fem.loads import external_force
+from fabfem.fem.model import Controls, Model, Refusal, States, elastic_tangents, initial_stress
+from fabfem.fem.newton import Solved, solve_increment
+from fabfem.fem.space import Space
+from fabfem.fem.stages import Stage
+from fabfem.fem.supports import constrain, reduction
+from fabfem.fem.trial import PHASES, Equilibrium, System, Trial, relative
+from fabfem.timing import Timer
 
 
 @dataclass(frozen=True)
@@ -97,7 +98,7 @@ def march(model: Model) -> Iterator[Increment | Stopped]:
     space = model.space
     pattern = find_pattern(space.dofs, space.ndof)
     elastic = stiffness(space, pattern, elastic_tangents(model.zones, model.states, space.npoints))
-    shared = (pattern, Clock(), float(np.abs(elastic.diagonal()).max()))
+    shared = (pattern, Timer(PHASES), float(np.abs(elastic.diagonal()).max()))
     return _all_stages(model, [_system(model, stage, *shared) for stage in model.stages])
 
 
@@ -107,11 +108,11 @@ def reaction(space: Space, increment: Increment, boundary: str, component: str) 
     return float((increment.internal_force - increment.external_force)[dofs].sum())
 
 
-def _system(model: Model, stage: Stage, pattern: Pattern, clock: Clock, stiffest: float) -> System:
+def _system(model: Model, stage: Stage, pattern: Pattern, timer: Timer, stiffest: float) -> System:
     constraints = constrain(model.space, stage.supports)
     reduce = reduction(pattern, constraints)
     solver = make_solver(model.solver, model.symmetric)
-    return System(model.space, model.zones, model.controls, constraints, pattern, reduce, solver, clock, stiffest)
+    return System(model.space, model.zones, model.controls, constraints, pattern, reduce, solver, timer, stiffest)
 
 
 def _all_stages(model: Model, systems: list[System]) -> Iterator[Increment | Stopped]:
@@ -157,18 +158,18 @@ def _through(
     stage, fraction, size, number = place.stage, 0.0, place.stage.first, place.number
     load, guess = external_force(system.space, stage.loads), None
     while fraction < 1.0:
-        spent = dict(system.clock.spent)
+        spent = dict(system.timer.spent)
         step = _tried(stage, system, load, now, fraction, size, guess)
         trial = step.solved.end
         if isinstance(trial, Refusal):
-            timings = system.clock.since(spent)
+            timings = system.timer.since(spent)
             yield Stopped(stage.name, place.stage_index, fraction, *trial, step.cutbacks, timings)
             return None, number
         number, fraction, old = number + 1, step.fraction, now
         now = Equilibrium(
             old.displacement + trial.step, trial.batch.states, trial.force - trial.drag, trial.batch.tangent
         )
-        yield _increment(place, number, system, old, now, step, trial, system.clock.since(spent))
+        yield _increment(place, number, system, old, now, step, trial, system.timer.since(spent))
         size = _next_size(stage, system.controls, step)
         guess = _extrapolated(system, trial.step, step.size, min(size, 1.0 - fraction))
     return now, number

@@ -1,49 +1,21 @@
 """All that a run writes, as it goes on: the history, the fields and the report."""
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import asdict
 from pathlib import Path
-from time import perf_counter
 from typing import Any
 
-from fabfem.fields import QUANTITIES
-from fabfem.omitted import remaining
-from fabfem.output.frame import frame
+from fabfem.boundary_value.fields import QUANTITIES
+from fabfem.boundary_value.frame import frame
+from fabfem.boundary_value.omitted import remaining
+from fabfem.boundary_value.problem import Problem
+from fabfem.fem.solve import Cutback, Increment
 from fabfem.output.history import History
 from fabfem.output.report import Report
 from fabfem.output.vtu import FieldFiles
-from fabfem.problem import Problem
-from fabfem.solve import Cutback, Increment
+from fabfem.timing import Timer
 
 SIGN = "stress and strain are positive in compression"
 PHASES = ("read", "mesh", "material", "assembly", "linear_solve", "output")
-
-
-class Timer:
-    """Wall time by phase [s]."""
-
-    def __init__(self) -> None:
-        self._begun = perf_counter()
-        self.spent = dict.fromkeys(PHASES, 0.0)
-
-    @contextmanager
-    def phase(self, name: str) -> Iterator[None]:
-        """Add the time of a block to a phase."""
-        begun = perf_counter()
-        try:
-            yield
-        finally:
-            self.spent[name] += perf_counter() - begun
-
-    def add(self, timings: dict[str, float]) -> None:
-        """Add the times that somebody else took."""
-        for name, seconds in timings.items():
-            self.spent[name] += seconds
-
-    def total(self) -> float:
-        """Return the time since the timer was made [s]."""
-        return perf_counter() - self._begun
 
 
 class Recorder:

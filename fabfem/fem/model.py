@@ -10,8 +10,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from fabfem.space import Space
-from fabfem.stages import Stage
+from fabfem.fem.space import Space
+from fabfem.fem.stages import Stage
 from umat import elastic_tangent, symmetric_tangent, update
 from umat.status import message
 

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 import umat
-from fabfem.model import States, Zone
-from fabfem.space import Space
+from fabfem.fem.model import States, Zone
+from fabfem.fem.space import Space
 from umat import mandel
 from umat.mandel import Array
 

@@ -8,22 +8,22 @@ from itertools import pairwise
 
 import numpy as np
 
-from fabfem.case import Case
+from fabfem.case import BoundaryValueCase
 from fabfem.case.stages import AnyStage, Geostatic, Load
 from fabfem.case.stages import Stage as Said
-from fabfem.loads import Gravity, Pressure, Traction, k0_stress
-from fabfem.loads import Load as Acting
-from fabfem.mesh import Mesh
-from fabfem.space import Space
-from fabfem.stages import Stage
-from fabfem.supports import Support
+from fabfem.fem.loads import Gravity, Pressure, Traction, k0_stress
+from fabfem.fem.loads import Load as Acting
+from fabfem.fem.mesh import Mesh
+from fabfem.fem.space import Space
+from fabfem.fem.stages import Stage
+from fabfem.fem.supports import Support
 from umat.mandel import Array
 
 Factors = dict[tuple[str, ...], float]
 """Size of each load at the end of a stage, by what it is and where it acts."""
 
 
-def program(case: Case, space: Space) -> tuple[Stage, ...]:
+def program(case: BoundaryValueCase, space: Space) -> tuple[Stage, ...]:
     """Return the stages of a case."""
     weights = {
         zone: table.unit_weight for name, table in case.material.items() for zone in zones_of(case, name, space.mesh)
@@ -39,7 +39,7 @@ def program(case: Case, space: Space) -> tuple[Stage, ...]:
     return tuple(stages)
 
 
-def zones_of(case: Case, material: str, mesh: Mesh) -> tuple[str, ...]:
+def zones_of(case: BoundaryValueCase, material: str, mesh: Mesh) -> tuple[str, ...]:
     """Return the zones of the mesh that a material of the case fills."""
     named = case.material[material].zones
     return tuple(mesh.zones) if named is None else named
@@ -82,7 +82,7 @@ def _load(key: tuple[str, ...], start: float, end: float, weights: dict[str, flo
     return Traction(key[1], unit, start, end)
 
 
-def _fixed(case: Case) -> Iterable[Support]:
+def _fixed(case: BoundaryValueCase) -> Iterable[Support]:
     return (
         Support(boundary, part) for support in case.support for boundary in support.boundary for part in support.fix
     )
@@ -99,7 +99,7 @@ def _moved(said: AnyStage) -> Sequence[Support]:
     ]
 
 
-def ground_stress(case: Case, space: Space, material: str, zone: str) -> Array:
+def ground_stress(case: BoundaryValueCase, space: Space, material: str, zone: str) -> Array:
     """Return the (n, 6) initial stress of a zone: level ground under its own weight, or none without that stage.
 
     Raises
@@ -116,7 +116,7 @@ def ground_stress(case: Case, space: Space, material: str, zone: str) -> Array:
     return k0_stress(space, points, top, case.material[material].unit_weight, said.k0, surcharge)
 
 
-def _overburden(case: Case, mesh: Mesh, height: float) -> float:
+def _overburden(case: BoundaryValueCase, mesh: Mesh, height: float) -> float:
     """Return the weight per area of the zones above a height."""
     layers = [
         (*_heights(mesh, zone), table.unit_weight)

@@ -5,8 +5,8 @@ from itertools import permutations
 
 import numpy as np
 
-from fabfem.elements import ELEMENTS
-from fabfem.mesh import Mesh, checked, outer_facets, quadratic
+from fabfem.fem.elements import ELEMENTS
+from fabfem.fem.mesh import Mesh, checked, outer_facets, quadratic
 
 SIDES = {2: (("left", "right"), ("bottom", "top")), 3: (("left", "right"), ("front", "back"), ("bottom", "top"))}
 """Names of the sides at the lower and upper end of each axis."""

@@ -9,18 +9,18 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 
 import umat
-from fabfem.case import Case, CaseError, boundaries_of, nearest, suggest
-from fabfem.fields import known_fields
-from fabfem.kinematics import KINEMATICS
-from fabfem.mesh import Mesh, read_mesh
-from fabfem.model import Controls, Model, Zone
-from fabfem.omitted import left_out
-from fabfem.probes import Column, columns
-from fabfem.program import ground_stress, program, zones_of
-from fabfem.space import Space, build_space
-from fabfem.stages import Stage
-from fabfem.supports import constrain
-from fabfem.zones import MisfitError, Substance, Surroundings, substance
+from fabfem.boundary_value.fields import known_fields
+from fabfem.boundary_value.omitted import left_out
+from fabfem.boundary_value.probes import Column, columns
+from fabfem.boundary_value.program import ground_stress, program, zones_of
+from fabfem.case import BoundaryValueCase, CaseError, boundaries_of, nearest, suggest
+from fabfem.fem.kinematics import KINEMATICS
+from fabfem.fem.mesh import Mesh, read_mesh
+from fabfem.fem.model import Controls, Model, Zone
+from fabfem.fem.space import Space, build_space
+from fabfem.fem.stages import Stage
+from fabfem.fem.supports import constrain
+from fabfem.substance import MisfitError, Substance, Surroundings, substance
 
 
 @dataclass(frozen=True)
@@ -39,13 +39,13 @@ class Problem:
         Sentences on what the scene leaves out.
     """
 
-    case: Case
+    case: BoundaryValueCase
     model: Model
     columns: tuple[Column, ...]
     omitted: tuple[str, ...]
 
 
-def build(case: Case) -> Problem:
+def build(case: BoundaryValueCase) -> Problem:
     """Return the problem that a case states.
 
     Raises
@@ -66,7 +66,7 @@ def build(case: Case) -> Problem:
     return Problem(case, model, found, tuple(left_out(case, space, known_fields(zones), substances)))
 
 
-def _space(case: Case) -> Space:
+def _space(case: BoundaryValueCase) -> Space:
     with _blamed(case, "mesh.file"):
         mesh = read_mesh(case.locate(case.mesh.file), case.mesh.order)
     _check_names(case, mesh)
@@ -74,13 +74,13 @@ def _space(case: Case) -> Space:
         return build_space(mesh, KINEMATICS[case.scene.kinematics])
 
 
-def _substance(case: Case, name: str, space: Space) -> Substance:
+def _substance(case: BoundaryValueCase, name: str, space: Space) -> Substance:
     flat = case.scene.kinematics in ("plane_strain", "axisymmetric")
     with _blamed(case, f"material.{name}"):
         return substance(case.material[name], Surroundings(case.unit_system, space.mesh.dim - 1, flat))
 
 
-def _zones(case: Case, name: str, space: Space, filling: Substance) -> Iterator[tuple[str, Zone]]:
+def _zones(case: BoundaryValueCase, name: str, space: Space, filling: Substance) -> Iterator[tuple[str, Zone]]:
     for zone in zones_of(case, name, space.mesh):
         with _blamed(case, f"stage[{case.stage[0].name}]"):
             stress = ground_stress(case, space, name, zone)
@@ -89,7 +89,7 @@ def _zones(case: Case, name: str, space: Space, filling: Substance) -> Iterator[
         yield zone, Zone(filling.material, filling.directions, state, space.points_of(space.mesh.zone(zone)))
 
 
-def _stages(case: Case, space: Space) -> tuple[Stage, ...]:
+def _stages(case: BoundaryValueCase, space: Space) -> tuple[Stage, ...]:
     stages = program(case, space)
     for stage in stages:
         with _blamed(case, f"stage[{stage.name}]"):
@@ -97,12 +97,12 @@ def _stages(case: Case, space: Space) -> tuple[Stage, ...]:
     return stages
 
 
-def _controls(case: Case) -> Controls:
+def _controls(case: BoundaryValueCase) -> Controls:
     said = case.solver
     return Controls(said.tolerance, said.iterations, viscosity=said.viscosity, held=said.held)
 
 
-def _check_names(case: Case, mesh: Mesh) -> None:
+def _check_names(case: BoundaryValueCase, mesh: Mesh) -> None:
     """Refuse boundaries and zones that the mesh does not have."""
     for where, kind, name in _named(case):
         there = mesh.zones if kind == "zone" else mesh.boundaries
@@ -113,7 +113,7 @@ def _check_names(case: Case, mesh: Mesh) -> None:
             raise CaseError(f"{case.path.name}: {where}: the mesh has no {kind} '{name}'; {hint}")
 
 
-def _named(case: Case) -> Iterator[tuple[str, str, str]]:
+def _named(case: BoundaryValueCase) -> Iterator[tuple[str, str, str]]:
     """Yield (place, kind, name) of every zone and boundary that a case names."""
     for key, material in case.material.items():
         yield from ((f"material.{key}.zones", "zone", name) for name in material.zones or ())
@@ -121,7 +121,7 @@ def _named(case: Case) -> Iterator[tuple[str, str, str]]:
         yield from ((place, "boundary", name) for name in names)
 
 
-def _check_fields(case: Case, zones: Mapping[str, Zone]) -> None:
+def _check_fields(case: BoundaryValueCase, zones: Mapping[str, Zone]) -> None:
     known = known_fields(zones)
     for name in case.output.fields if case.output else ():
         if name not in known:
@@ -131,7 +131,7 @@ def _check_fields(case: Case, zones: Mapping[str, Zone]) -> None:
 
 
 @contextmanager
-def _blamed(case: Case, place: str) -> Iterator[None]:
+def _blamed(case: BoundaryValueCase, place: str) -> Iterator[None]:
     """Turn a refusal of the parts into a sentence that names the place in the case."""
     try:
         yield

@@ -4,16 +4,18 @@ from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
-from fabfem.case import Case
-from fabfem.model import Model
-from fabfem.space import Space
-from fabfem.zones import Substance
+from fabfem.case import BoundaryValueCase
+from fabfem.fem.model import Model
+from fabfem.fem.space import Space
+from fabfem.substance import Substance
 
 PROGRAM = 250.0
 """Memory of the interpreter with all packages and compiled kernels [MiB]."""
 
 
-def left_out(case: Case, space: Space, fields: Sequence[str], substances: Mapping[str, Substance]) -> Iterator[str]:
+def left_out(
+    case: BoundaryValueCase, space: Space, fields: Sequence[str], substances: Mapping[str, Substance]
+) -> Iterator[str]:
     """Yield a sentence for each thing that a scene does without."""
     nodes = len(space.mesh.points)
     yield f"no pore pressure: the scene is dry ({nodes} unknowns fewer)"

@@ -10,9 +10,9 @@ from functools import cached_property
 import numba
 import numpy as np
 
-from fabfem.elements import ELEMENTS, quadrature, shape
-from fabfem.kinematics import Kinematics
-from fabfem.mesh import Mesh
+from fabfem.fem.elements import ELEMENTS, quadrature, shape
+from fabfem.fem.kinematics import Kinematics
+from fabfem.fem.mesh import Mesh
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,7 @@ from typing import NamedTuple
 from fabfem.case import CaseError
 from fabfem.output.history import read_history
 
-DRAW = (sys.executable, "-m", "fabfem.draw")
+DRAW = (sys.executable, "-m", "fabfem.pictures.draw")
 """Command that draws the fields of the folder it is given."""
 
 TIME_LIMIT = 600.0

@@ -4,38 +4,19 @@ With viscosity η (see `Controls`) the points also carry the stress η/Δt D_e �
 increment begins and Δt the increment's part of the stage. It is no part of the state; its nodal forces are the drag.
 """
 
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
-from time import perf_counter
+from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
 
-from fabfem.assembly import Pattern
-from fabfem.linear import LinearSolver, norm
-from fabfem.model import Batch, Controls, Refusal, States, Zone, elastic_tangents, update_points
-from fabfem.space import Space
-from fabfem.supports import Constraints, Reduction
+from fabfem.fem.assembly import Pattern
+from fabfem.fem.linear import LinearSolver, norm
+from fabfem.fem.model import Batch, Controls, Refusal, States, Zone, elastic_tangents, update_points
+from fabfem.fem.space import Space
+from fabfem.fem.supports import Constraints, Reduction
+from fabfem.timing import Timer
 
-
-class Clock:
-    """Seconds spent in each phase."""
-
-    def __init__(self) -> None:
-        self.spent = {"material": 0.0, "assembly": 0.0, "linear_solve": 0.0}
-
-    @contextmanager
-    def phase(self, name: str) -> Iterator[None]:
-        """Add the time of a block to a phase."""
-        begun = perf_counter()
-        try:
-            yield
-        finally:
-            self.spent[name] += perf_counter() - begun
-
-    def since(self, before: Mapping[str, float]) -> dict[str, float]:
-        """Seconds spent in each phase after a copy of `spent` was made."""
-        return {name: seconds - before[name] for name, seconds in self.spent.items()}
+PHASES = ("material", "assembly", "linear_solve")
 
 
 class System(NamedTuple):
@@ -48,7 +29,7 @@ class System(NamedTuple):
     pattern: Pattern
     reduce: Reduction
     solver: LinearSolver
-    clock: Clock
+    timer: Timer
     stiffest: float
     """Largest diagonal entry of the elastic stiffness."""
 
@@ -103,11 +84,11 @@ def make_task(system: System, old: Equilibrium, load: np.ndarray, size: float) -
 def attempt(system: System, old: Equilibrium, task: Task, step: np.ndarray) -> Trial | Refusal:
     """What a displacement increment leaves out of balance, or why the points refuse it."""
     strain = system.space.strain(step)
-    with system.clock.phase("material"):
+    with system.timer.phase("material"):
         batch = update_points(system.zones, strain, old.states, system.controls.held)
     if isinstance(batch, Refusal):
         return batch
-    with system.clock.phase("assembly"):
+    with system.timer.phase("assembly"):
         drag = _drag(system, task, strain)
         force = system.space.internal_force(batch.stress) + drag
     unbalanced = (task.load - force)[system.constraints.free]

@@ -10,7 +10,7 @@ import numba
 import numpy as np
 from scipy.sparse import csr_matrix
 
-from fabfem.space import Space
+from fabfem.fem.space import Space
 
 
 @dataclass(frozen=True)

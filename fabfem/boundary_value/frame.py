@@ -1,10 +1,10 @@
 """The fields of an increment as they are stored: smoothed at nodes, raw means in cells, tensors in VTK's order."""
 
-from fabfem.case.schema import Output
-from fabfem.fields import point_fields
+from fabfem.boundary_value.fields import point_fields
+from fabfem.boundary_value.problem import Problem
+from fabfem.case.boundary_value import Output
+from fabfem.fem.solve import Increment
 from fabfem.output.vtu import Frame
-from fabfem.problem import Problem
-from fabfem.solve import Increment
 from umat import mandel
 from umat.mandel import Array
 

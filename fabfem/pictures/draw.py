@@ -1,7 +1,7 @@
 """Pictures of the fields of a result, drawn off-screen with pyvista.
 
-Run as ``python -m fabfem.draw DIR``, in a process of its own: on a machine without off-screen OpenGL, VTK ends the
-process instead of raising. Deformation is drawn at its true scale.
+Run as ``python -m fabfem.pictures.draw DIR``, in a process of its own: on a machine without off-screen
+OpenGL, VTK ends the process instead of raising. Deformation is drawn at its true scale.
 """
 
 import json

@@ -15,7 +15,7 @@ import meshio
 import numpy as np
 from meshio.abaqus._abaqus import abaqus_to_meshio_type
 
-from fabfem.elements import ELEMENTS, ElementType, quadrature, shape
+from fabfem.fem.elements import ELEMENTS, ElementType, quadrature, shape
 
 
 class MeshError(ValueError):

@@ -1,0 +1,83 @@
+"""A boundary-value run from the case to the last row: march the problem, write what converges, say how it ended."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+from fabfem.boundary_value.omitted import remaining
+from fabfem.boundary_value.problem import Problem, build
+from fabfem.boundary_value.record import PHASES, Recorder
+from fabfem.case import BoundaryValueCase
+from fabfem.case.stages import Geostatic
+from fabfem.fem.solve import Increment, Stopped, march
+from fabfem.outcome import Description, Outcome, make_folder, short
+from fabfem.output.interrupt import held_back
+from fabfem.output.progress import Quiet, Terminal
+from fabfem.timing import Timer
+
+
+def describe(case: BoundaryValueCase) -> Description:
+    """Return what a case leaves out and what remains, without running it.
+
+    Raises
+    ------
+    CaseError
+        If the case cannot be run.
+    """
+    problem = build(case)
+    return Description(problem.omitted, tuple(remaining(problem.model)))
+
+
+def run(case: BoundaryValueCase, folder: Path, quiet: bool, timer: Timer | None = None) -> Outcome:
+    """Run a case and write its results into a folder; see `fabfem.run.run_case`."""
+    timer = timer or Timer(PHASES)
+    with timer.phase("mesh"):
+        problem = build(case)
+        steps = march(problem.model)
+    make_folder(folder)
+    recorder = Recorder(problem, folder, timer)
+    stages = len(problem.model.stages)
+    with Quiet() if quiet else Terminal(stages) as shown:
+        status, reason = _drive(steps, recorder, shown)
+    headers = [column.header for column in problem.columns]
+    last = tuple((header, short(value)) for header, value in zip(headers, recorder.row, strict=False))
+    return Outcome(status, reason, folder, len(recorder.report.content["increments"]), last, timer.total())
+
+
+def _drive(steps: Iterator[Increment | Stopped], recorder: Recorder, shown: Quiet) -> tuple[str, str]:
+    """March to the end and return the status and the reason."""
+    case = recorder.problem.case
+    try:
+        for step in steps:
+            if isinstance(step, Stopped):
+                recorder.timer.add(step.timings)
+                return recorder.end("stopped", _why(step, recorder.problem), step.cutbacks)
+            with held_back():
+                recorder.add(step)
+            if isinstance(case.stage[step.stage_index], Geostatic):
+                shown.say(_audit(step, case.units.length))
+            shown.advance(step.stage, step.stage_index + step.fraction, step.number, step.iterations)
+    except KeyboardInterrupt:
+        return recorder.end("interrupted", "interrupted; all increments that converged are kept")
+    except OSError as error:
+        return "stopped", f"the results cannot be written: {error.strerror or error}"
+    return recorder.end("completed", "")
+
+
+def _audit(step: Increment, length: str) -> str:
+    """Return how far the initial state was from equilibrium."""
+    unbalanced = f"out of balance by {step.out_of_balance:.1e} of the forces at work"
+    return f"{step.stage}: {unbalanced}, moved {step.moved:.1e} {length}"
+
+
+def _why(stopped: Stopped, problem: Problem) -> str:
+    """Return the sentence that says why and where a run stopped."""
+    where = f" at {_coordinates(problem, stopped.point)}" if stopped.point >= 0 else ""
+    return (
+        f"stage {stopped.stage} stopped at {100.0 * stopped.fraction:.3g} % of its course: "
+        f"{stopped.reason.rstrip('.')}{where}; all increments that converged are kept"
+    )
+
+
+def _coordinates(problem: Problem, point: int) -> str:
+    places = ", ".join(f"{value:.4g}" for value in problem.model.space.points[point])
+    return f"point {point} ({places})"
