@@ -4,6 +4,7 @@ from fabfem.boundary_value.fields import point_fields
 from fabfem.boundary_value.problem import Problem
 from fabfem.case.boundary_value import Output
 from fabfem.fem.solve import Increment
+from fabfem.fem.space import Space
 from fabfem.output.vtu import Frame
 from umat import mandel
 from umat.mandel import Array
@@ -16,11 +17,16 @@ def frame(problem: Problem, output: Output, increment: Increment) -> Frame:
     space = problem.model.space
     gathered = point_fields(space, problem.model.zones, increment.displacement, increment.states, output.fields)
     shown = {name: in_vtk_order(values) for name, values in gathered.items()}
-    at_nodes = {name: space.nodal(values) for name, values in shown.items()} if "nodes" in output.at else {}
+    at_nodes = {name: _smoothed(space, values) for name, values in shown.items()} if "nodes" in output.at else {}
     in_cells = {name: space.cell_mean(values) for name, values in shown.items()} if "cells" in output.at else {}
     if "displacement" in output.fields:
         at_nodes = {"displacement": space.displacement(increment.displacement), **at_nodes}
     return Frame(increment.time, at_nodes, in_cells)
+
+
+def _smoothed(space: Space, values: Array) -> Array:
+    """Return values at nodes: scalars within the range around each, of tensors a fit exact for linear fields."""
+    return space.nodal_within(values) if values.ndim == 1 else space.nodal(values)
 
 
 def in_vtk_order(values: Array) -> Array:

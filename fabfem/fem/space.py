@@ -119,6 +119,17 @@ class Space:
             total[:, k] = np.bincount(cells.ravel(), (fitted[:, :, k] * volume[:, None]).ravel(), len(total)) / share
         return total.reshape(len(total), *values.shape[1:])
 
+    def nodal_within(self, values: np.ndarray) -> np.ndarray:
+        """(nnodes,) smoothed values, none beyond the range of the points in the elements around the node.
+
+        A linear fit reaches beyond the points: near a footing's edge a mean stress becomes negative, a void ratio huge.
+        """
+        cells, by_cell = self.mesh.cells, values.reshape(-1, self.nq)
+        least, most = np.full(len(self.mesh.points), np.inf), np.full(len(self.mesh.points), -np.inf)
+        np.minimum.at(least, cells, by_cell.min(axis=1)[:, None])
+        np.maximum.at(most, cells, by_cell.max(axis=1)[:, None])
+        return np.clip(self.nodal(values), least, most)
+
     @cached_property
     def _to_nodes(self) -> np.ndarray:
         """(nnode, nq) least-squares fit of the linear element's functions to the points, evaluated at the nodes."""
