@@ -96,7 +96,8 @@ def _system(
     constraints = constrain(model.space, stage.supports, stage.bodies, gone)
     reduce = reduction(pattern, constraints)
     there = {name: zone for name, zone in zones.items() if name not in stage.absent}
-    there = weaken(there, stage.strength, stage.spared)
+    if not isinstance(stage.goal, StrengthSearch):
+        there = weaken(there, stage.strength, stage.spared)
     solver = make_solver(model.solver, symmetric(there))
     return System(model.space, there, model.controls, constraints, pattern, reduce, solver, timer, stiffest)
 

@@ -133,3 +133,8 @@ class Stage:
             raise ValueError(f"stage '{self.name}' needs 0 < smallest <= first <= largest <= 1 for its increments.")
         if self.strength <= 0.0:
             raise ValueError(f"stage '{self.name}' divides the strength by {self.strength:g}, which is not positive.")
+        moving = [support.displacement for support in self.supports] + [
+            value for body in self.bodies for value in body.motion.values()
+        ]
+        if isinstance(self.goal, StrengthSearch) and any(moving):
+            raise ValueError(f"stage '{self.name}' searches for the factor of safety, so nothing may be moved in it.")
