@@ -16,6 +16,7 @@ from umat.interface import (
     state_fields,
     symmetric_tangent,
     update,
+    weakened,
 )
 from umat.threads import set_threads
 
@@ -33,6 +34,7 @@ __all__ = [
     "state_fields",
     "symmetric_tangent",
     "update",
+    "weakened",
 ]
 
 _HOMES = {

@@ -16,6 +16,7 @@ from umat.interface import (
     state_fields,
     symmetric_tangent,
     update,
+    weakened,
 )
 from umat.mandel import Array, q
 from umat.plastic import PlasticState, closed_form, unstrained
@@ -66,6 +67,13 @@ def _(material: VonMises, state: PlasticState) -> dict[str, Array]:
 def _(material: VonMises, state: PlasticState) -> Array:
     elastic = Elastic(material.youngs_modulus, material.poisson_ratio)
     return elastic_tangent(elastic, state)
+
+
+@weakened.register
+def _(material: VonMises, factor: float) -> VonMises:
+    """Return σ_y/F and H/F."""
+    hardening = material.hardening_modulus / factor
+    return material._replace(yield_stress=material.yield_stress / factor, hardening_modulus=hardening)
 
 
 def _cylinder(material: VonMises) -> Cone:

@@ -6,11 +6,13 @@ A load is a fixed field times a factor that goes from `start` to `end` over the 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import singledispatch
+from typing import NamedTuple
 
 import numpy as np
 
 from fabfem.fem.elements import ELEMENTS, quadrature, shape
 from fabfem.fem.space import Space
+from fabfem.fem.supports import MOTIONS, RigidBody, body_modes
 
 
 @dataclass(frozen=True)
@@ -43,10 +45,49 @@ class Traction:
     end: float = 1.0
 
 
-Load = Gravity | Pressure | Traction
+@dataclass(frozen=True)
+class BodyForce:
+    """Force [force] and moment at the point of a rigid body, by motion of the body (`supports.MOTIONS`).
+
+    It acts on the body, so it is no load of the soil: the body hands it on as the reaction of its boundary.
+    """
+
+    body: RigidBody
+    force: Mapping[str, float]
+    start: float = 0.0
+    end: float = 1.0
 
 
-def external_force(space: Space, loads: Sequence[Load]) -> Callable[[float], np.ndarray]:
+Load = Gravity | Pressure | Traction | BodyForce
+
+
+Force = Callable[[float], np.ndarray]
+
+
+class Loading(NamedTuple):
+    """The (ndof,) nodal forces of a stage as functions of the fraction of it that has passed."""
+
+    total: Force
+    """All loads."""
+    on_soil: Force
+    """Those that act on the soil, not on rigid bodies."""
+
+    def released(self, force: np.ndarray) -> "Loading":
+        """The same with a force (ndof,) that fades away over the stage."""
+        return Loading(
+            lambda fraction: self.total(fraction) + (1.0 - fraction) * force,
+            lambda fraction: self.on_soil(fraction) + (1.0 - fraction) * force,
+        )
+
+
+def loading(space: Space, loads: Sequence[Load]) -> Loading:
+    """The nodal forces of `loads`."""
+    total = external_force(space, loads)
+    soil = tuple(load for load in loads if not isinstance(load, BodyForce))
+    return Loading(total, total if len(soil) == len(loads) else external_force(space, soil))
+
+
+def external_force(space: Space, loads: Sequence[Load]) -> Force:
     """The (ndof,) nodal forces of `loads` as a function of the fraction of the stage that has passed."""
     base, growth = np.zeros(space.ndof), np.zeros(space.ndof)
     for load in loads:
@@ -87,6 +128,22 @@ def _(load: Traction, space: Space) -> np.ndarray:
     facets, values, areas, _ = _boundary(space, load.boundary)
     traction = _checked(space, load.traction, "a traction")
     return _gather(space, facets, np.einsum("fq,qa->fa", areas, values)[:, :, None] * traction)
+
+
+@nodal_force.register
+def _(load: BodyForce, space: Space) -> np.ndarray:
+    """Forces on the tied dofs, in the span of the rigid motions, with the resultants asked for."""
+    names, (dofs, modes) = MOTIONS[space.components], body_modes(space, load.body)
+    for name in load.force:
+        if name not in names:
+            raise ValueError(f"a rigid body takes no force along '{name}' here; it has {', '.join(names)}.")
+    resultant = np.array([load.force.get(name, 0.0) for name in names])
+    share = modes @ np.linalg.lstsq(modes.T @ modes, resultant, rcond=1e-12)[0]
+    if np.abs(modes.T @ share - resultant).max() > 1e-9 * np.abs(resultant).max(initial=0.0):
+        raise ValueError(f"a smooth body on boundary '{load.body.boundary}' cannot hand on a force along it.")
+    force = np.zeros(space.ndof)
+    force[dofs] = share
+    return force
 
 
 def k0_stress(

@@ -4,7 +4,7 @@ Newton sees the points only through `update_points` and `elastic_tangents`, the 
 the solver only through `linear`; each works on the elements of its space, be it all of them or one rank's.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
@@ -12,7 +12,7 @@ import numpy as np
 
 from fabfem.fem.space import Space
 from fabfem.fem.stages import Stage
-from umat import elastic_tangent, symmetric_tangent, update
+from umat import elastic_tangent, symmetric_tangent, update, weakened
 from umat.status import message
 
 States = dict[str, Any]
@@ -98,14 +98,14 @@ class Model:
             raise ValueError(f"element {element} belongs to {count[element * self.space.nq]} zones instead of one.")
 
     @property
-    def symmetric(self) -> bool:
-        """Whether the stiffness is symmetric whatever the points do."""
-        return all(symmetric_tangent(zone.material) for zone in self.zones.values())
-
-    @property
     def states(self) -> States:
         """Initial states by zone."""
         return {name: zone.state for name, zone in self.zones.items()}
+
+
+def symmetric(zones: Mapping[str, Zone]) -> bool:
+    """Whether the stiffness is symmetric whatever the points do."""
+    return all(symmetric_tangent(zone.material) for zone in zones.values())
 
 
 class Refusal(NamedTuple):
@@ -139,11 +139,13 @@ def update_points(
 ) -> Batch | Refusal:
     """The answer of all points to a strain increment (npoints, 6), or the first point that refused.
 
+    Points without a zone have no stress and no stiffness; states of other zones are handed on.
+
     `may_hold` is the share of all points that may refuse and are held instead.
     """
     npoints, held = len(strain_increment), 0
-    stress, tangent = np.empty((npoints, 6)), np.empty((npoints, 6, 6))
-    error, states = np.empty(npoints), {}
+    stress, tangent = np.zeros((npoints, 6)), np.zeros((npoints, 6, 6))
+    error, states = np.zeros(npoints), dict(old)
     for name, zone in zones.items():
         response = update(zone.material, zone.directions, strain_increment[zone.points], old[name])
         refused = np.flatnonzero(response.status)
@@ -163,16 +165,26 @@ def update_points(
 
 
 def elastic_tangents(zones: Mapping[str, Zone], states: States, npoints: int) -> np.ndarray:
-    """(npoints, 6, 6) elastic tangents."""
-    tangent = np.empty((npoints, 6, 6))
+    """(npoints, 6, 6) elastic tangents; zero where there is no zone."""
+    tangent = np.zeros((npoints, 6, 6))
     for name, zone in zones.items():
         tangent[zone.points] = elastic_tangent(zone.material, states[name])
     return tangent
 
 
-def initial_stress(zones: Mapping[str, Zone], npoints: int) -> np.ndarray:
-    """(npoints, 6) stress of the initial states."""
-    stress = np.empty((npoints, 6))
-    for zone in zones.values():
-        stress[zone.points] = zone.state.stress
+def stress_of(zones: Mapping[str, Zone], states: States, npoints: int) -> np.ndarray:
+    """(npoints, 6) stress of the states; zero where there is no zone."""
+    stress = np.zeros((npoints, 6))
+    for name, zone in zones.items():
+        stress[zone.points] = states[name].stress
     return stress
+
+
+def weaken(zones: Mapping[str, Zone], factor: float, spared: Sequence[str] = ()) -> dict[str, Zone]:
+    """The zones with the strength of their materials divided by `factor`, except those `spared`."""
+    if factor == 1.0:
+        return dict(zones)
+    return {
+        name: zone if name in spared else zone._replace(material=weakened(zone.material, factor))
+        for name, zone in zones.items()
+    }

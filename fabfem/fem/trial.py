@@ -51,7 +51,7 @@ class Task(NamedTuple):
     load: np.ndarray
     """(ndof,) external force at its end."""
     motion: np.ndarray
-    """Displacement of the held dofs in it."""
+    """(ndof,) displacement in it of the dofs that are no unknowns."""
     viscous: np.ndarray | None
     """(npoints, 6, 6) viscous stress by strain increment, where there is viscosity."""
 
@@ -67,7 +67,7 @@ class Trial(NamedTuple):
     drag: np.ndarray
     """(ndof,) nodal forces of the viscous stress."""
     unbalanced: np.ndarray
-    """Out-of-balance force on free dofs."""
+    """Out-of-balance force on the unknowns."""
     norm: float
     residual: float
     """The norm relative to the forces at work."""
@@ -91,7 +91,7 @@ def attempt(system: System, old: Equilibrium, task: Task, step: np.ndarray) -> T
     with system.timer.phase("assembly"):
         drag = _drag(system, task, strain)
         force = system.space.internal_force(batch.stress) + drag
-    unbalanced = (task.load - force)[system.constraints.free]
+    unbalanced = system.constraints.collect(task.load - force)
     size = norm(unbalanced)
     return Trial(step, batch, force, drag, unbalanced, size, relative(size, force, task.load))
 
