@@ -74,7 +74,7 @@ def flow(system: System, now: Equilibrium, load: np.ndarray, enough: float) -> F
 
 def flowed(old: Equilibrium, trial: Trial) -> Equilibrium:
     """The state that a viscous increment ends in; its internal force is that of the stress alone."""
-    return Equilibrium(old.displacement + trial.step, trial.batch.states, trial.force - trial.drag, trial.batch.tangent)
+    return Equilibrium(old.displacement + trial.step, trial.batch.states, trial.skeleton, trial.batch.tangent)
 
 
 def elastic_displacement(system: System, now: Equilibrium, load: np.ndarray) -> float:

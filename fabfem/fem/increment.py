@@ -10,7 +10,7 @@ from fabfem.fem.linear import norm
 from fabfem.fem.model import States, Zone
 from fabfem.fem.newton import Solved
 from fabfem.fem.stages import Stage
-from fabfem.fem.trial import Equilibrium, System, Trial, relative
+from fabfem.fem.trial import Equilibrium, System, Trial, begun, mechanical, relative
 
 
 @dataclass(frozen=True)
@@ -164,9 +164,7 @@ class Step(NamedTuple):
 
 def advanced(old: Equilibrium, trial: Trial) -> Equilibrium:
     """The equilibrium that a trial ends in."""
-    return Equilibrium(
-        old.displacement + trial.step, trial.batch.states, trial.force - trial.drag, trial.batch.tangent
-    )
+    return Equilibrium(old.displacement + trial.step, trial.batch.states, trial.skeleton, trial.batch.tangent)
 
 
 def largest(system: System, displacement: np.ndarray) -> float:
@@ -187,7 +185,8 @@ def increment(
     load_factor: float | None = None,
 ) -> Increment:
     """The record of an increment from `old` to `now`."""
-    start = norm(system.constraints.collect(step.load - old.force))
+    force = begun(system, old, step.size)
+    start = norm(mechanical(system, system.constraints.collect(step.load - force)))
     return Increment(
         stage=place.stage.name,
         stage_index=place.stage_index,
@@ -201,7 +200,7 @@ def increment(
         external_force=step.on_soil,
         iterations=step.solved.iterations,
         residuals=step.solved.residuals,
-        out_of_balance=relative(start, old.force, step.load),
+        out_of_balance=relative(start, mechanical(system, force), step.load),
         drag=relative(norm(trial.drag), trial.force, step.load),
         held=trial.batch.held,
         moved=largest(system, trial.step),

@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from fabfem.fem.pores import PoreWater
 from fabfem.fem.space import Space
 from fabfem.fem.stages import Stage
 from umat import elastic_tangent, symmetric_tangent, update, weakened
@@ -80,13 +81,14 @@ class Controls:
 
 @dataclass(frozen=True)
 class Model:
-    """Everything that `march` needs; `solver` is "auto", "superlu" or "pardiso"."""
+    """Everything that `march` needs; `solver` is "auto", "superlu" or "pardiso"; `water` needs a `PorousSpace`."""
 
     space: Space
     zones: Mapping[str, Zone]
     stages: tuple[Stage, ...]
     controls: Controls = field(default_factory=Controls)
     solver: str = "auto"
+    water: PoreWater | None = None
 
     def __post_init__(self) -> None:
         """Refuse zones that leave points out or share them."""

@@ -15,7 +15,7 @@ from scipy.sparse import csr_matrix
 from fabfem.fem.assembly import stiffness
 from fabfem.fem.linear import norm
 from fabfem.fem.model import Controls, Refusal, elastic_tangents
-from fabfem.fem.trial import Equilibrium, System, Task, Trial, attempt, make_task
+from fabfem.fem.trial import Equilibrium, System, Task, Trial, attempt, make_task, mechanical
 
 
 class Solved(NamedTuple):
@@ -94,7 +94,7 @@ def _first_that_works(
 def _extended(system: System, old: Equilibrium, task: Task, tangent: np.ndarray) -> Trial | Refusal:
     """The trial of one linear step from `old` to the new load and held dofs."""
     matrix = stiffness_of(system, task, tangent)
-    correction = solved(system, matrix, system.constraints.collect(task.load - old.force - matrix @ task.motion))
+    correction = solved(system, matrix, system.constraints.collect(task.load - task.start - matrix @ task.motion))
     if isinstance(correction, Refusal):
         return correction
     return attempt(system, old, task, task.motion + system.constraints.spread(correction))
@@ -109,17 +109,21 @@ def _searched(system: System, old: Equilibrium, task: Task, trial: Trial, tangen
     if isinstance(correction, Refusal):
         return correction
     along = system.constraints.spread(correction)
-    start = float((correction * trial.unbalanced).sum())
+    start = _work(system, correction, trial.unbalanced)
     tried: list[Trial | Refusal] = []
     factor = 1.0
     for _ in range(system.controls.backtracks + 1):
         new = attempt(system, old, task, trial.step + factor * along)
         tried.append(new)
-        left = float((correction * new.unbalanced).sum()) if isinstance(new, Trial) else 0.0
+        left = _work(system, correction, new.unbalanced) if isinstance(new, Trial) else 0.0
         if isinstance(new, Trial) and _content(system.controls, new.norm / trial.norm, start, left):
             return new
         factor *= float(np.clip(start / (start - left), 0.1, 0.5)) if left < 0.0 < start else 0.5
     return _least(system, trial, tried)
+
+
+def _work(system: System, correction: np.ndarray, unbalanced: np.ndarray) -> float:
+    return float((mechanical(system, correction) * mechanical(system, unbalanced)).sum())
 
 
 def _content(controls: Controls, rise: float, start: float, left: float) -> bool:
@@ -142,7 +146,10 @@ def _least(system: System, trial: Trial, tried: list[Trial | Refusal]) -> Trial 
 def stiffness_of(system: System, task: Task, tangent: np.ndarray) -> csr_matrix:
     with system.timer.phase("assembly"):
         whole = tangent if task.viscous is None else tangent + task.viscous
-        return stiffness(system.space, system.pattern, whole)
+        matrix = stiffness(system.space, system.pattern, whole)
+        if task.wet is not None:
+            matrix.data += task.wet.data
+        return matrix
 
 
 def solved(system: System, matrix: csr_matrix, rhs: np.ndarray) -> np.ndarray | Refusal:

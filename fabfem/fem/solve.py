@@ -24,8 +24,9 @@ from fabfem.fem.increment import (
 )
 from fabfem.fem.linear import make_solver
 from fabfem.fem.loads import Loading, loading
-from fabfem.fem.model import Controls, Model, Refusal, Zone, elastic_tangents, stress_of, symmetric, weaken
+from fabfem.fem.model import Model, Refusal, Zone, elastic_tangents, stress_of, symmetric, weaken
 from fabfem.fem.newton import solve_increment
+from fabfem.fem.pores import Water, pace_error, water_of
 from fabfem.fem.space import Space
 from fabfem.fem.stages import ArcLength, DisplacementControl, Stage, StrengthSearch
 from fabfem.fem.supports import constrain, reduction
@@ -40,6 +41,12 @@ COURSES = {
     ArcLength: "fabfem.fem.follow",
 }
 """Module whose `through` goes through a stage with such a goal."""
+
+TOO_FAST = 4.0
+"""Error of a time step, over what the stage allows, at which it is done again."""
+
+Last = tuple[np.ndarray, float] | None
+"""The last increment of the stage: its (ndof,) step and its size."""
 
 Course = Generator[Increment | Stopped | Collapsed, None, tuple[Equilibrium | None, int]]
 
@@ -93,13 +100,23 @@ def _system(
     model: Model, stage: Stage, zones: Mapping[str, Zone], pattern: Pattern, timer: Timer, stiffest: float
 ) -> System:
     gone = absent_dofs(model.space, {name: zones[name] for name in stage.absent})
+    water = _water(model, stage, pattern)
+    if model.water is not None and water is None:
+        gone = np.union1d(gone, np.arange(model.space.nmotion, model.space.ndof))
     constraints = constrain(model.space, stage.supports, stage.bodies, gone)
     reduce = reduction(pattern, constraints)
     there = {name: zone for name, zone in zones.items() if name not in stage.absent}
     if not isinstance(stage.goal, StrengthSearch):
         there = weaken(there, stage.strength, stage.spared)
     solver = make_solver(model.solver, symmetric(there))
-    return System(model.space, there, model.controls, constraints, pattern, reduce, solver, timer, stiffest)
+    return System(model.space, there, model.controls, constraints, pattern, reduce, solver, timer, stiffest, water)
+
+
+def _water(model: Model, stage: Stage, pattern: Pattern) -> Water | None:
+    """What pore water does in a stage; None where there is none, or its excess pressure is zero."""
+    if model.water is None or stage.drainage == "drained":
+        return None
+    return water_of(model.space, pattern, model.water, stage.drainage == "seepage", stage.duration)
 
 
 def _all_stages(model: Model, systems: list[System]) -> Iterator[Increment | Stopped | Collapsed]:
@@ -113,7 +130,7 @@ def _all_stages(model: Model, systems: list[System]) -> Iterator[Increment | Sto
             return
         now = reached
         if stage.zero_displacement:
-            now = now._replace(displacement=np.zeros(space.ndof))
+            now = now._replace(displacement=space.at_rest(now.displacement))
         time += stage.duration
 
 
@@ -138,10 +155,10 @@ def _course(place: Place, system: System, now: Equilibrium) -> Course:
 def _through(place: Place, system: System, now: Equilibrium, load: Loading) -> Course:
     """Yield the increments of a stage; return its last equilibrium, None where it stopped, and their number so far."""
     stage, fraction, size, number = place.stage, 0.0, place.stage.first, place.number
-    guess = None
+    guess, last = None, None
     while fraction < 1.0:
         spent = dict(system.timer.spent)
-        step = _tried(stage, system, load, now, fraction, size, guess)
+        step = _tried(stage, system, load, now, fraction, size, guess, last)
         trial = step.solved.end
         if isinstance(trial, Refusal):
             timings = system.timer.since(spent)
@@ -150,7 +167,7 @@ def _through(place: Place, system: System, now: Equilibrium, load: Loading) -> C
         number, fraction, old = number + 1, step.fraction, now
         now = advanced(old, trial)
         yield increment(place, number, system, old, now, step, trial, system.timer.since(spent))
-        size = _next_size(stage, system.controls, step)
+        size, last = _next_size(stage, system, now, step, last), (trial.step, step.size)
         guess = _extrapolated(system, trial.step, step.size, min(size, 1.0 - fraction))
     return now, number
 
@@ -163,6 +180,7 @@ def _tried(
     fraction: float,
     size: float,
     guess: np.ndarray | None,
+    last: Last,
 ) -> Step:
     """The increment after `fraction`, made smaller until it converges or its size is below the stage's smallest."""
     cutbacks: tuple[Cutback, ...] = ()
@@ -171,20 +189,38 @@ def _tried(
         size = target - fraction
         forces = load.total(target)
         solved = solve_increment(system, now, forces, size, guess)
-        if isinstance(solved.end, Trial):
+        end = solved.end
+        may_shrink = 0.5 * size >= stage.smallest
+        if isinstance(end, Trial) and may_shrink and _pace(stage, system, now, (end.step, size), last) > TOO_FAST:
+            end = Refusal("the pore pressure changes faster than the time step can follow")
+        if isinstance(end, Trial):
             return Step(solved, target, size, forces, load.on_soil(target), cutbacks)
-        cutbacks += (Cutback(stage.name, fraction, size, *solved.end),)
+        cutbacks += (Cutback(stage.name, fraction, size, *end),)
         size, guess = 0.5 * size, None
         if size < stage.smallest:
-            return Step(solved, target, size, forces, forces, cutbacks)
+            return Step(solved._replace(end=end), target, size, forces, forces, cutbacks)
 
 
-def _next_size(stage: Stage, controls: Controls, step: Step) -> float:
-    """The size to try next: larger after an easy increment that needed no cut-back."""
+def _next_size(stage: Stage, system: System, now: Equilibrium, step: Step, last: Last) -> float:
+    """The size to try next: larger after an easy increment that needed no cut-back, as the flow of water allows."""
+    controls, end = system.controls, step.solved.end
     easy = step.solved.iterations <= controls.easy and not step.cutbacks
-    return min(step.size * (controls.growth if easy else 1.0), stage.largest)
+    growth = controls.growth if easy else 1.0
+    pace = _pace(stage, system, now, (end.step, step.size), last) if isinstance(end, Trial) else 0.0
+    if pace > 0.0:
+        growth = float(np.clip(0.9 * pace**-0.5, 0.3, growth))
+    return min(step.size * growth, stage.largest)
+
+
+def _pace(stage: Stage, system: System, now: Equilibrium, new: tuple[np.ndarray, float], last: Last) -> float:
+    """The error of a time step over what the stage allows; 0 where nothing flows or nothing is asked."""
+    if system.water is None or system.water.seepage is None or stage.time_tolerance == 0.0:
+        return 0.0
+    return pace_error(system.water, now.displacement, new, last) / stage.time_tolerance
 
 
 def _extrapolated(system: System, last: np.ndarray, last_size: float, size: float) -> np.ndarray | None:
     """The last displacement increment carried on to the next size, where the controls ask for that."""
+    if system.water is not None:  # a drain lets pressures fall in one step only
+        return None
     return last * (size / last_size) if system.controls.extrapolate else None

@@ -102,6 +102,10 @@ class Space:
         full[:, self.kinematics.axes] = u.reshape(len(full), -1)
         return full
 
+    def at_rest(self, u: np.ndarray) -> np.ndarray:
+        """The unknowns with the displacement set to zero."""
+        return np.zeros_like(u)
+
     def cell_mean(self, values: np.ndarray) -> np.ndarray:
         """(nel, ...) volume means of point values (npoints, ...)."""
         weights = self.weights.reshape(-1, self.nq)

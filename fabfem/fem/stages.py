@@ -77,6 +77,7 @@ class ArcLength:
 
 Goal = StrengthSearch | DisplacementControl | ArcLength
 
+
 @dataclass(frozen=True)
 class Stage:
     """One part of a run. It holds only what it names: repeat fixities and gravity in every stage.
@@ -107,6 +108,11 @@ class Stage:
         Factor by which the strength of the materials is divided (`umat.weakened`); where a stage searches, at first.
     spared : tuple of str
         Zones whose strength is not divided.
+    drainage : str
+        What water does where the model has any: ``drained``, its excess pressure is zero; ``undrained``, it stays where
+        it is; ``seepage``, it flows.
+    time_tolerance : float
+        Error of a time step's pressures, relative to the largest, that is allowed where water flows; 0 asks nothing.
     goal : StrengthSearch, DisplacementControl, ArcLength or None
         What drives the stage, where it is not the fraction of its loads and motions.
     """
@@ -125,6 +131,8 @@ class Stage:
     released: bool = False
     strength: float = 1.0
     spared: tuple[str, ...] = ()
+    drainage: str = "drained"
+    time_tolerance: float = 0.0
     goal: Goal | None = None
 
     def __post_init__(self) -> None:

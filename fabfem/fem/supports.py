@@ -31,7 +31,10 @@ EXACT = 1e-9
 
 @dataclass(frozen=True)
 class Support:
-    """One held component of a boundary; `displacement` [length] is added in equal parts over the stage."""
+    """One held component of a boundary; `displacement` [length] is added in equal parts over the stage.
+
+    A held pore pressure takes the value `displacement` [stress] at once: there the water drains.
+    """
 
     boundary: str
     component: str
@@ -190,7 +193,9 @@ def _solutions(equations: np.ndarray, values: np.ndarray, body: RigidBody) -> tu
         return np.zeros(n), np.eye(n)
     given = np.linalg.lstsq(equations, values, rcond=EXACT)[0]
     if np.abs(equations @ given - values).max() > EXACT * max(np.abs(values).max(), 1e-300):
-        raise ValueError(f"the rigid body on boundary '{body.boundary}' is to move in a way that another support forbids.")
+        raise ValueError(
+            f"the rigid body on boundary '{body.boundary}' is to move in a way that another support forbids."
+        )
     _, sizes, rows = np.linalg.svd(equations)
     rank = int((sizes > EXACT * sizes[0]).sum()) if sizes[0] > 0.0 else 0
     return given, rows[rank:].T
@@ -201,7 +206,8 @@ def _refuse_rigid_motion(space: Space, constraints: Constraints, absent: np.ndar
     points = space.mesh.points
     size = float(np.ptp(points, axis=0).max())
     centred = (points - points.mean(axis=0) * (not space.kinematics.radial)) / size
-    modes = space.kinematics.modes(centred).reshape(-1, space.ndof)
+    modes = space.kinematics.modes(centred).reshape(-1, len(points) * len(space.components))
+    modes = np.pad(modes, ((0, 0), (0, space.ndof - modes.shape[1])))
     allowed = np.concatenate([constraints.free, absent])
     against = modes.copy()
     against[:, allowed] = 0.0
