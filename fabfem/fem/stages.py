@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
-from fabfem.fem.loads import Load
+from fabfem.fem.loads import Gravity, Load
 from fabfem.fem.supports import RigidBody, Support
 
 
@@ -126,6 +126,12 @@ class Stage:
     strength: float = 1.0
     spared: tuple[str, ...] = ()
     goal: Goal | None = None
+
+    @property
+    def marks(self) -> tuple[float, ...]:
+        """Fractions of the stage at which an increment must end: where a load's table bends, and the end."""
+        tables = [load.table for load in self.loads if not isinstance(load, Gravity)]
+        return (*sorted({at for table in tables for at, _ in table if 0.0 < at < 1.0}), 1.0)
 
     def __post_init__(self) -> None:
         """Refuse sizes that cannot step through the stage."""
