@@ -44,8 +44,10 @@ class VonMises(Material):
     """Poisson's ratio."""
     yield_stress: Positive
     """Yield stress in uniaxial loading, which is the square root of 3 times the shear strength [stress]."""
-    hardening_modulus: NotNegative = 0.0
-    """Slope of the yield stress against plastic strain [stress]."""
+    hardening_modulus: float = 0.0
+    """Slope of the yield stress against plastic strain, negative for softening [stress]."""
+    residual_stress: NotNegative = 0.0
+    """Yield stress at which softening ends [stress]."""
 
 
 class MohrCoulomb(Material):

@@ -139,6 +139,8 @@ class Stage:
             raise ValueError(f"stage '{self.name}' needs 0 < smallest <= first <= largest <= 1 for its increments.")
         if self.strength <= 0.0:
             raise ValueError(f"stage '{self.name}' divides the strength by {self.strength:g}, which is not positive.")
+        if self.goal is not None and len(self.marks) > 1:
+            raise ValueError(f"stage '{self.name}' is not driven by its time, so no load of it can follow a ramp.")
         moving = [support.displacement for support in self.supports] + [
             value for body in self.bodies for value in body.motion.values()
         ]
