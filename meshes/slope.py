@@ -1,4 +1,4 @@
-"""Make the slope meshes: 6-node triangles, finest where the slip surfaces run.
+"""Make the slope meshes: 8-node quadrilaterals, finest where the slip surfaces run.
 
 Every slope falls to the right, its toe at the origin. The boundaries are left, right, bottom, crest, face, toe (the level
 ground before it, where there is some); the zone above the toe is "slope", below it "ground". Needs gmsh
@@ -31,7 +31,8 @@ class Slope(NamedTuple):
 
 
 SLOPES = {
-    "slope_2to1": Slope(height=10.0, run=20.0, crest=12.0, fine=0.6, coarse=1.2),
+    "slope_2to1": Slope(height=10.0, run=20.0, crest=12.0, fine=0.45, coarse=1.0),
+    "slope_2to1_coarse": Slope(height=10.0, run=20.0, crest=10.0, fine=1.2, coarse=1.8),
     "slope_45": Slope(height=10.0, run=10.0, crest=12.0, toe=8.0, depth=5.0, fine=0.5, coarse=1.5),
     "slope_2to1_ground": Slope(height=10.0, run=20.0, crest=12.0, toe=10.0, depth=5.0, fine=0.6, coarse=1.6),
 }
@@ -96,6 +97,9 @@ def main(folder: Path) -> None:
         gmsh.initialize()
         gmsh.option.setNumber("General.Terminal", 0)
         draw(slope)
+        gmsh.option.setNumber("Mesh.RecombineAll", 1)
+        gmsh.option.setNumber("Mesh.RecombinationAlgorithm", 3)  # blossom, quadrilaterals only
+        gmsh.option.setNumber("Mesh.SecondOrderIncomplete", 1)
         gmsh.model.mesh.generate(2)
         gmsh.model.mesh.setOrder(2)
         gmsh.write(str(folder / f"{name}.msh"))

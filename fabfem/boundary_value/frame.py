@@ -1,6 +1,6 @@
 """The fields of an increment as they are stored: smoothed at nodes, raw means in cells, tensors in VTK's order."""
 
-from fabfem.boundary_value.fields import point_fields
+from fabfem.boundary_value.fields import AT_NODES, point_fields
 from fabfem.boundary_value.problem import Problem
 from fabfem.case.boundary_value import Output
 from fabfem.fem.solve import Increment
@@ -15,12 +15,12 @@ VTK_ROW, VTK_COLUMN = [0, 1, 2, 0, 1, 0], [0, 1, 2, 1, 2, 2]
 def frame(problem: Problem, output: Output, increment: Increment) -> Frame:
     """Return the fields of an increment that the case asks for."""
     space = problem.model.space
-    gathered = point_fields(space, problem.model.zones, increment.displacement, increment.states, output.fields)
+    gathered = point_fields(space, increment, output.fields)
     shown = {name: in_vtk_order(values) for name, values in gathered.items()}
     at_nodes = {name: _smoothed(space, values) for name, values in shown.items()} if "nodes" in output.at else {}
     in_cells = {name: space.cell_mean(values) for name, values in shown.items()} if "cells" in output.at else {}
-    if "displacement" in output.fields:
-        at_nodes = {"displacement": space.displacement(increment.displacement), **at_nodes}
+    of_nodes = {name: space.displacement(AT_NODES[name](increment)) for name in output.fields if name in AT_NODES}
+    at_nodes = of_nodes | at_nodes
     return Frame(increment.time, at_nodes, in_cells)
 
 

@@ -1,6 +1,6 @@
 """Columns of the history: what each increment is, and the probes, reactions and derived values of the case."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from math import prod
 from typing import NamedTuple
 
@@ -9,8 +9,9 @@ from numpy.typing import NDArray
 
 from fabfem.case import BoundaryValueCase
 from fabfem.case.boundary_value import Derived, Probe, Reaction
-from fabfem.fem.solve import Increment
+from fabfem.fem.increment import Increment
 from fabfem.fem.space import Space
+from fabfem.fem.stages import ArcLength, DisplacementControl, Stage, StrengthSearch
 
 Value = str | int | float
 Measure = Callable[[Increment], float]
@@ -34,12 +35,12 @@ class Column(NamedTuple):
         return f"{self.name} [{self.unit}]" if self.unit else self.name
 
 
-def columns(case: BoundaryValueCase, space: Space) -> tuple[Column, ...]:
-    """Return the columns of a case's history."""
+def columns(case: BoundaryValueCase, space: Space, stages: Sequence[Stage] = ()) -> tuple[Column, ...]:
+    """Return the columns of a case's history; a factor has one where a stage lets it vary."""
     units = case.unit_system
     force = units.label("line_force" if case.scene.kinematics == "plane_strain" else "force")
     measures: dict[str, Measure] = {}
-    found = list(_standing())
+    found = [*_standing(), *_factors(stages)]
     for probe in case.probe:
         measures[probe.name] = _displacement(probe, space)
         found.append(Column(probe.name, units.label("length"), "probe", measures[probe.name]))
@@ -58,6 +59,14 @@ def _standing() -> tuple[Column, ...]:
         Column("time", "-", "", lambda increment: float(increment.time)),
         Column("iterations", "-", "", lambda increment: increment.iterations),
     )
+
+
+def _factors(stages: Sequence[Stage]) -> Iterator[Column]:
+    goals = [stage.goal for stage in stages]
+    if any(isinstance(goal, StrengthSearch) for goal in goals) or any(stage.strength != 1.0 for stage in stages):
+        yield Column("strength_factor", "-", "", lambda increment: float(increment.strength))
+    if any(isinstance(goal, DisplacementControl | ArcLength) for goal in goals):
+        yield Column("load_factor", "-", "factor", lambda increment: float(increment.load_factor))
 
 
 def _displacement(probe: Probe, space: Space) -> Measure:

@@ -4,19 +4,23 @@ What is wrong in a case and can only be seen here (a boundary that the mesh lack
 `CaseError` with one sentence naming the place in the file.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+
+import numpy as np
 
 import umat
 from fabfem.boundary_value.fields import known_fields
 from fabfem.boundary_value.omitted import left_out
 from fabfem.boundary_value.probes import Column, columns
-from fabfem.boundary_value.program import ground_stress, program, zones_of
-from fabfem.case import BoundaryValueCase, CaseError, boundaries_of, nearest, suggest
+from fabfem.boundary_value.program import Scene, ground_stress, program, zones_of
+from fabfem.case import BoundaryValueCase, CaseError, boundaries_of, nearest, suggest, zones_named
 from fabfem.fem.kinematics import KINEMATICS
+from fabfem.fem.loads import loading
 from fabfem.fem.mesh import Mesh, read_mesh
 from fabfem.fem.model import Controls, Model, Zone
+from fabfem.fem.solve import absent_dofs
 from fabfem.fem.space import Space, build_space
 from fabfem.fem.stages import Stage
 from fabfem.fem.supports import constrain
@@ -56,14 +60,17 @@ def build(case: BoundaryValueCase) -> Problem:
     space = _space(case)
     substances = {name: _substance(case, name, space) for name in case.material}
     zones = {zone: filled for name in case.material for zone, filled in _zones(case, name, space, substances[name])}
-    _check_fields(case, zones)
+    stages = _stages(case, space, substances, zones)
     with _blamed(case, "material"):
-        model = Model(space, zones, _stages(case, space), _controls(case), case.solver.linear)
+        known = known_fields(zones | dict(_spare(substances, zones)))
+    _check_fields(case, known)
+    with _blamed(case, "material"):
+        model = Model(space, zones, stages, _controls(case), case.solver.linear)
     with _blamed(case, "probe or reaction"):
-        found = columns(case, space)
+        found = columns(case, space, stages)
     if case.solver.threads:
         umat.set_threads(case.solver.threads)
-    return Problem(case, model, found, tuple(left_out(case, space, known_fields(zones), substances)))
+    return Problem(case, model, found, tuple(left_out(case, space, known, substances)))
 
 
 def _space(case: BoundaryValueCase) -> Space:
@@ -89,12 +96,27 @@ def _zones(case: BoundaryValueCase, name: str, space: Space, filling: Substance)
         yield zone, Zone(filling.material, filling.directions, state, space.points_of(space.mesh.zone(zone)))
 
 
-def _stages(case: BoundaryValueCase, space: Space) -> tuple[Stage, ...]:
-    stages = program(case, space)
-    for stage in stages:
-        with _blamed(case, f"stage[{stage.name}]"):
-            constrain(space, stage.supports)
-    return stages
+def _stages(
+    case: BoundaryValueCase, space: Space, substances: Mapping[str, Substance], zones: Mapping[str, Zone]
+) -> tuple[Stage, ...]:
+    found, course = [], program(Scene(case, space, substances))
+    for said in case.stage:
+        with _blamed(case, f"stage[{said.name}]"):
+            stage = next(course)
+            gone = absent_dofs(space, {zone: zones[zone] for zone in stage.absent})
+            constrain(space, stage.supports, stage.bodies, gone)
+            loading(space, stage.loads)
+        found.append(stage)
+    return tuple(found)
+
+
+def _spare(substances: Mapping[str, Substance], zones: Mapping[str, Zone]) -> Iterator[tuple[str, Zone]]:
+    """Yield (name, zone of one point) of the materials that no zone has at first, for the fields that they have."""
+    used = [zone.material for zone in zones.values()]
+    for name, spare in substances.items():
+        if spare.material not in used:
+            state = umat.initial_state(spare.material, spare.directions, np.eye(1, 6) + np.eye(1, 6, 1) + np.eye(1, 6, 2), **spare.needs)
+            yield f"[{name}]", Zone(spare.material, spare.directions, state, slice(0, 0))
 
 
 def _controls(case: BoundaryValueCase) -> Controls:
@@ -115,14 +137,13 @@ def _check_names(case: BoundaryValueCase, mesh: Mesh) -> None:
 
 def _named(case: BoundaryValueCase) -> Iterator[tuple[str, str, str]]:
     """Yield (place, kind, name) of every zone and boundary that a case names."""
-    for key, material in case.material.items():
-        yield from ((f"material.{key}.zones", "zone", name) for name in material.zones or ())
+    for place, names in zones_named(case):
+        yield from ((place, "zone", name) for name in names)
     for place, names in boundaries_of(case):
         yield from ((place, "boundary", name) for name in names)
 
 
-def _check_fields(case: BoundaryValueCase, zones: Mapping[str, Zone]) -> None:
-    known = known_fields(zones)
+def _check_fields(case: BoundaryValueCase, known: Sequence[str]) -> None:
     for name in case.output.fields if case.output else ():
         if name not in known:
             raise CaseError(

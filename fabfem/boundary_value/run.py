@@ -2,13 +2,17 @@
 
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
+from fabfem.boundary_value.audit import audited
 from fabfem.boundary_value.omitted import remaining
 from fabfem.boundary_value.problem import Problem, build
 from fabfem.boundary_value.record import PHASES, Recorder
 from fabfem.case import BoundaryValueCase
-from fabfem.case.stages import Geostatic
-from fabfem.fem.solve import Increment, Stopped, march
+from fabfem.boundary_value.safety import sentence
+from fabfem.fem.flow import UNDECIDED
+from fabfem.fem.increment import Collapsed, Increment, Stopped
+from fabfem.fem.solve import march
 from fabfem.outcome import Description, Outcome, make_folder, short
 from fabfem.output.interrupt import held_back
 from fabfem.output.progress import Quiet, Terminal
@@ -43,7 +47,7 @@ def run(case: BoundaryValueCase, folder: Path, quiet: bool, timer: Timer | None 
     return Outcome(status, reason, folder, len(recorder.report.content["increments"]), last, timer.total())
 
 
-def _drive(steps: Iterator[Increment | Stopped], recorder: Recorder, shown: Quiet) -> tuple[str, str]:
+def _drive(steps: Iterator[Increment | Stopped | Collapsed], recorder: Recorder, shown: Quiet) -> tuple[str, str]:
     """March to the end and return the status and the reason."""
     case = recorder.problem.case
     try:
@@ -51,10 +55,12 @@ def _drive(steps: Iterator[Increment | Stopped], recorder: Recorder, shown: Quie
             if isinstance(step, Stopped):
                 recorder.timer.add(step.timings)
                 return recorder.end("stopped", _why(step, recorder.problem), step.cutbacks)
+            if isinstance(step, Collapsed):
+                return _found(step, recorder, shown)
             with held_back():
                 recorder.add(step)
-            if isinstance(case.stage[step.stage_index], Geostatic):
-                shown.say(_audit(step, case.units.length))
+            if audited(recorder.problem, step):
+                shown.say(_audit(recorder.report.content["audit"], case.units.length))
             shown.advance(step.stage, step.stage_index + step.fraction, step.number, step.iterations)
     except KeyboardInterrupt:
         return recorder.end("interrupted", "interrupted; all increments that converged are kept")
@@ -63,10 +69,20 @@ def _drive(steps: Iterator[Increment | Stopped], recorder: Recorder, shown: Quie
     return recorder.end("completed", "")
 
 
-def _audit(step: Increment, length: str) -> str:
-    """Return how far the initial state was from equilibrium."""
-    unbalanced = f"out of balance by {step.out_of_balance:.1e} of the forces at work"
-    return f"{step.stage}: {unbalanced}, moved {step.moved:.1e} {length}"
+def _found(end: Collapsed, recorder: Recorder, shown: Quiet) -> tuple[str, str]:
+    """Record the factor of safety and return status and reason."""
+    with held_back():
+        recorder.failed(end)
+    shown.say(sentence(end))
+    if end.last_equilibrium is None or end.verdict == UNDECIDED:
+        return recorder.end("stopped", sentence(end))
+    return recorder.end("completed", "")
+
+
+def _audit(found: dict[str, Any], length: str) -> str:
+    """Return how far the initial state was from equilibrium, and why."""
+    unbalanced = f"out of balance by {found['out_of_balance']:.1e} of the forces at work"
+    return f"{found['stage']}: {unbalanced}, moved {found['moved']:.1e} {length}; {found['why']}"
 
 
 def _why(stopped: Stopped, problem: Problem) -> str:

@@ -5,7 +5,7 @@ names that only those can vouch for are checked when the problem is built, with 
 """
 
 from fabfem.case.boundary_value import BoundaryValueCase
-from fabfem.case.names import boundaries_of
+from fabfem.case.names import boundaries_of, zones_named
 from fabfem.case.reader import case_from, read_case, resolved
 from fabfem.case.schema import Case
 from fabfem.case.sentences import CaseError
@@ -21,4 +21,5 @@ __all__ = [
     "read_case",
     "resolved",
     "suggest",
+    "zones_named",
 ]

@@ -4,7 +4,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field, field_validator
 
-from fabfem.case.table import Angle, Names, NotNegative, Positive, Table, Text
+from fabfem.case.table import Angle, NotNegative, Positive, SomeNames, Table, Text
 
 SOLID_FRACTION_LIMIT = 13.28 / 8.0
 """Void ratio at which the number of contacts per particle, 13.28 - 8 e, vanishes [ZK table 3]."""
@@ -18,8 +18,8 @@ class Material(Table):
 
     model: str
     """Which material it is."""
-    zones: Names | None = None
-    """Zones of the mesh made of this material; all zones when left out."""
+    zones: SomeNames | None = None
+    """Zones of the mesh made of this material at first, [] for none; all zones when left out."""
     unit_weight: NotNegative = 0.0
     """Unit weight that gravity acts on (buoyant below a water table)."""
 
@@ -44,8 +44,10 @@ class VonMises(Material):
     """Poisson's ratio."""
     yield_stress: Positive
     """Yield stress in uniaxial loading, which is the square root of 3 times the shear strength [stress]."""
-    hardening_modulus: NotNegative = 0.0
-    """Slope of the yield stress against plastic strain [stress]."""
+    hardening_modulus: float = 0.0
+    """Slope of the yield stress against plastic strain, negative for softening [stress]."""
+    residual_stress: NotNegative = 0.0
+    """Yield stress at which softening ends [stress]."""
 
 
 class MohrCoulomb(Material):

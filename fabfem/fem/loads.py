@@ -1,6 +1,7 @@
 """What pushes: weight of zones, pressure and traction on boundaries; and the initial stress of level ground.
 
-A load is a fixed field times a factor that goes from `start` to `end` over the stage.
+A load is a fixed field times a factor that goes from `start` to `end` over the stage, or follows a table of (fraction of
+the stage, factor), linear in between.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -33,6 +34,7 @@ class Pressure:
     pressure: float
     start: float = 0.0
     end: float = 1.0
+    table: tuple[tuple[float, float], ...] = ()
 
 
 @dataclass(frozen=True)
@@ -43,6 +45,7 @@ class Traction:
     traction: tuple[float, ...]
     start: float = 0.0
     end: float = 1.0
+    table: tuple[tuple[float, float], ...] = ()
 
 
 @dataclass(frozen=True)
@@ -56,6 +59,7 @@ class BodyForce:
     force: Mapping[str, float]
     start: float = 0.0
     end: float = 1.0
+    table: tuple[tuple[float, float], ...] = ()
 
 
 Load = Gravity | Pressure | Traction | BodyForce
@@ -90,11 +94,15 @@ def loading(space: Space, loads: Sequence[Load]) -> Loading:
 def external_force(space: Space, loads: Sequence[Load]) -> Force:
     """The (ndof,) nodal forces of `loads` as a function of the fraction of the stage that has passed."""
     base, growth = np.zeros(space.ndof), np.zeros(space.ndof)
+    tabled = []
     for load in loads:
         force = nodal_force(load, space)
-        base += load.start * force
-        growth += (load.end - load.start) * force
-    return lambda fraction: base + fraction * growth
+        if isinstance(load, Gravity) or not load.table:
+            base += load.start * force
+            growth += (load.end - load.start) * force
+        else:
+            tabled.append((force, *np.transpose(load.table)))
+    return lambda at: base + at * growth + sum(np.interp(at, *table) * force for force, *table in tabled)
 
 
 @singledispatch

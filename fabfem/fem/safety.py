@@ -44,8 +44,8 @@ class Bracket(NamedTuple):
         if self.low is None:
             return first
         if self.high is None:
-            return min(self.low + goal.step, goal.largest)
-        return self.high if self.narrow(goal) else 0.5 * (self.low + self.high)
+            return min(round(self.low + goal.step, 10), goal.largest)
+        return self.high if self.narrow(goal) else round(0.5 * (self.low + self.high), 10)
 
     def after(self, factor: float, stands: bool) -> "Bracket":
         """The bracket once a factor was tried; one that stands after all opens it again."""

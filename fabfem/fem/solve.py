@@ -124,7 +124,11 @@ def _all_stages(model: Model, systems: list[System]) -> Iterator[Increment | Sto
     now = Equilibrium(np.zeros(space.ndof), model.states, np.zeros(space.ndof), np.zeros((0, 6, 6)))
     number, time = 0, 0.0
     for index, (stage, system) in enumerate(zip(model.stages, systems, strict=True)):
-        now = _begun(now, stage, system)
+        try:
+            now = _begun(now, stage, system)
+        except ValueError as error:
+            yield Stopped(stage.name, index, 0.0, f"a zone cannot change its material: {error}", -1, (), {})
+            return
         reached, number = yield from _course(Place(stage, index, number, time), system, now)
         if reached is None:
             return
@@ -184,8 +188,9 @@ def _tried(
 ) -> Step:
     """The increment after `fraction`, made smaller until it converges or its size is below the stage's smallest."""
     cutbacks: tuple[Cutback, ...] = ()
+    end = next(mark for mark in stage.marks if mark > fraction + 1e-9)
     while True:
-        target = fraction + size if fraction + 1.001 * size < 1.0 else 1.0
+        target = fraction + size if fraction + 1.001 * size < end else end
         size = target - fraction
         forces = load.total(target)
         solved = solve_increment(system, now, forces, size, guess)

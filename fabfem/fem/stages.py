@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
-from fabfem.fem.loads import Load
+from fabfem.fem.loads import Gravity, Load
 from fabfem.fem.supports import RigidBody, Support
 
 
@@ -135,12 +135,20 @@ class Stage:
     time_tolerance: float = 0.0
     goal: Goal | None = None
 
+    @property
+    def marks(self) -> tuple[float, ...]:
+        """Fractions of the stage at which an increment must end: where a load's table bends, and the end."""
+        tables = [load.table for load in self.loads if not isinstance(load, Gravity)]
+        return (*sorted({at for table in tables for at, _ in table if 0.0 < at < 1.0}), 1.0)
+
     def __post_init__(self) -> None:
         """Refuse sizes that cannot step through the stage."""
         if not 0.0 < self.smallest <= self.first <= self.largest <= 1.0:
             raise ValueError(f"stage '{self.name}' needs 0 < smallest <= first <= largest <= 1 for its increments.")
         if self.strength <= 0.0:
             raise ValueError(f"stage '{self.name}' divides the strength by {self.strength:g}, which is not positive.")
+        if self.goal is not None and len(self.marks) > 1:
+            raise ValueError(f"stage '{self.name}' is not driven by its time, so no load of it can follow a ramp.")
         moving = [support.displacement for support in self.supports] + [
             value for body in self.bodies for value in body.motion.values()
         ]
