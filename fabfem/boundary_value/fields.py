@@ -19,7 +19,7 @@ from umat.mandel import Array
 
 QUANTITIES = {
     **{"displacement": "length", "displacement_increment": "length", "stress": "stress", "p": "stress", "q": "stress"},
-    "second_order_work": "stress",
+    **{"second_order_work": "stress", "pore_pressure": "stress"},
 }
 """Quantity of each field, which decides its unit; those not listed are plain numbers."""
 
@@ -46,10 +46,13 @@ OF_MOTION: dict[str, Callable[[Space, Increment], Array]] = {
 """Fields made of what an increment does."""
 
 
-def known_fields(zones: Mapping[str, Zone]) -> tuple[str, ...]:
-    """Return the names of the fields that the zones of a problem have."""
+PORE_PRESSURE = "pore_pressure"
+
+
+def known_fields(zones: Mapping[str, Zone], wet: bool = False) -> tuple[str, ...]:
+    """Return the names of the fields that the zones of a problem have; `wet` where there is water."""
     own = {field: None for zone in zones.values() for field in umat.state_fields(zone.material, _first(zone.state))}
-    return (*AT_NODES, *OF_MOTION, *OF_STRESS, *own)
+    return (*AT_NODES, *OF_MOTION, *OF_STRESS, *own, *((PORE_PRESSURE,) if wet else ()))
 
 
 def point_fields(space: Space, increment: Increment, asked: Sequence[str]) -> dict[str, Array]:

@@ -1,7 +1,8 @@
 """The fields of an increment as they are stored: smoothed at nodes, raw means in cells, tensors in VTK's order."""
 
-from fabfem.boundary_value.fields import AT_NODES, point_fields
+from fabfem.boundary_value.fields import AT_NODES, PORE_PRESSURE, point_fields
 from fabfem.boundary_value.problem import Problem
+from fabfem.boundary_value.water import nodal_pore_pressure, point_pore_pressure
 from fabfem.case.boundary_value import Output
 from fabfem.fem.solve import Increment
 from fabfem.fem.space import Space
@@ -21,6 +22,9 @@ def frame(problem: Problem, output: Output, increment: Increment) -> Frame:
     in_cells = {name: space.cell_mean(values) for name, values in shown.items()} if "cells" in output.at else {}
     of_nodes = {name: space.displacement(AT_NODES[name](increment)) for name in output.fields if name in AT_NODES}
     at_nodes = of_nodes | at_nodes
+    if PORE_PRESSURE in output.fields:
+        at_nodes[PORE_PRESSURE] = nodal_pore_pressure(problem.case, space, increment)
+        in_cells[PORE_PRESSURE] = space.cell_mean(point_pore_pressure(problem.case, space, increment))
     return Frame(increment.time, at_nodes, in_cells)
 
 

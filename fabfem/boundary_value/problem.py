@@ -15,11 +15,13 @@ from fabfem.boundary_value.fields import known_fields
 from fabfem.boundary_value.omitted import left_out
 from fabfem.boundary_value.probes import Column, columns
 from fabfem.boundary_value.program import Scene, ground_stress, program, zones_of
+from fabfem.boundary_value.water import pore_water
 from fabfem.case import BoundaryValueCase, CaseError, boundaries_of, nearest, suggest, zones_named
 from fabfem.fem.kinematics import KINEMATICS
 from fabfem.fem.loads import loading
 from fabfem.fem.mesh import Mesh, read_mesh
 from fabfem.fem.model import Controls, Model, Zone
+from fabfem.fem.pores import porous
 from fabfem.fem.solve import absent_dofs
 from fabfem.fem.space import Space, build_space
 from fabfem.fem.stages import Stage
@@ -62,10 +64,12 @@ def build(case: BoundaryValueCase) -> Problem:
     zones = {zone: filled for name in case.material for zone, filled in _zones(case, name, space, substances[name])}
     stages = _stages(case, space, substances, zones)
     with _blamed(case, "material"):
-        known = known_fields(zones | dict(_spare(substances, zones)))
+        known = known_fields(zones | dict(_spare(substances, zones)), case.water is not None)
     _check_fields(case, known)
     with _blamed(case, "material"):
-        model = Model(space, zones, stages, _controls(case), case.solver.linear)
+        filling = {zone: name for name in case.material for zone in zones_of(case, name, space.mesh)}
+        water = pore_water(case, space, zones, filling)
+        model = Model(space, zones, stages, _controls(case), case.solver.linear, water)
     with _blamed(case, "probe or reaction"):
         found = columns(case, space, stages)
     if case.solver.threads:
@@ -78,7 +82,9 @@ def _space(case: BoundaryValueCase) -> Space:
         mesh = read_mesh(case.locate(case.mesh.file), case.mesh.order)
     _check_names(case, mesh)
     with _blamed(case, "scene.kinematics"):
-        return build_space(mesh, KINEMATICS[case.scene.kinematics])
+        space = build_space(mesh, KINEMATICS[case.scene.kinematics])
+    with _blamed(case, "water.excess"):
+        return porous(space) if case.water is not None and case.water.excess else space
 
 
 def _substance(case: BoundaryValueCase, name: str, space: Space) -> Substance:

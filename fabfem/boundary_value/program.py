@@ -10,12 +10,14 @@ from typing import NamedTuple
 import numpy as np
 
 import umat
+from fabfem.boundary_value.water import effective_weights, table_level, weight_at_points
 from fabfem.case import BoundaryValueCase, stages
 from fabfem.case.stages import AnyStage, Geostatic, Load, StrengthReduction
 from fabfem.case.stages import Gravity as Weight
 from fabfem.fem.loads import BodyForce, Gravity, Pressure, Traction, k0_stress
 from fabfem.fem.loads import Load as Acting
 from fabfem.fem.mesh import Mesh
+from fabfem.fem.pores import PORE_PRESSURE
 from fabfem.fem.space import Space
 from fabfem.fem.stages import ArcLength, Change, DisplacementControl, Goal, Stage, StrengthSearch
 from fabfem.fem.supports import RigidBody, Support
@@ -86,7 +88,7 @@ def _stage(scene: Scene, said: AnyStage, before: Standing) -> tuple[Stage, Stand
     loads = tuple(_acting(scene, key, course, bodies) for key, course in courses.items() if _acts(key, bodies))
     stage = Stage(
         name=said.name,
-        supports=(*_fixed(case), *_moved(said)),
+        supports=(*_fixed(case), *_moved(said), *_drains(said)),
         loads=loads,
         first=steps.initial,
         largest=steps.maximum,
@@ -100,6 +102,8 @@ def _stage(scene: Scene, said: AnyStage, before: Standing) -> tuple[Stage, Stand
         strength=strength,
         spared=(said.excluded_zones or ()) if isinstance(said, StrengthReduction) else (),
         goal=_goal(said),
+        drainage=said.drainage if isinstance(said, Load) else "drained",
+        time_tolerance=said.time_tolerance if isinstance(said, Load) else 0.0,
     )
     ends = {key: course.table[-1][1] if course.table else course.end for key, course in courses.items()}
     return stage, Standing(ends, gravity, strength, frozenset(absent))
@@ -120,8 +124,7 @@ def _courses(
     found = still | {
         key: course._replace(start=_start(said, key, course, before.factors)) for key, course in named.items()
     }
-    weights = {zone: table.unit_weight for name, table in scene.case.material.items() for zone in _filled(scene, name)}
-    for zone in weights:
+    for zone in [zone for name in scene.case.material for zone in _filled(scene, name)]:
         key = ("gravity", zone)
         found.pop(key, None)
         if zone not in absent:
@@ -170,8 +173,9 @@ def _acts(key: tuple[str, ...], bodies: Sequence[RigidBody]) -> bool:
 def _acting(scene: Scene, key: tuple[str, ...], course: Course, bodies: Sequence[RigidBody]) -> Acting:
     start, end, table = course
     if key[0] == "gravity":
-        weights = {zone: said.unit_weight for name, said in scene.case.material.items() for zone in _filled(scene, name)}
-        return Gravity({key[1]: weights[key[1]]}, start=start, end=end)
+        material = {zone: name for name in scene.case.material for zone in _filled(scene, name)}[key[1]]
+        weight = weight_at_points(scene.case, scene.space, material, key[1])
+        return Gravity({key[1]: weight}, start=start, end=end)
     if key[0] == "pressure":
         return Pressure(key[1], 1.0, start, end, table)
     if key[0] == "rigid":
@@ -222,6 +226,11 @@ def _fixed(case: BoundaryValueCase) -> Iterable[Support]:
     )
 
 
+def _drains(said: AnyStage) -> Iterable[Support]:
+    names = (said.drains or ()) if isinstance(said, Load) else ()
+    return (Support(boundary, PORE_PRESSURE) for boundary in names)
+
+
 def _moved(said: AnyStage) -> Sequence[Support]:
     if not isinstance(said, Load):
         return ()
@@ -247,7 +256,8 @@ def ground_stress(case: BoundaryValueCase, space: Space, material: str, zone: st
         return _isotropic(_first_stress(case, zone), len(space.weights[points]))
     _, top = _heights(space.mesh, zone)
     surcharge = said.surcharge + _overburden(case, space.mesh, top)
-    return k0_stress(space, points, top, case.material[material].unit_weight, said.k0, surcharge)
+    above, below = effective_weights(case, material)
+    return k0_stress(space, points, top, above, said.k0, surcharge, table_level(case), below)
 
 
 def _first_stress(case: BoundaryValueCase, zone: str) -> float:
@@ -267,15 +277,16 @@ def _isotropic(pressure: float, count: int) -> Array:
 def _overburden(case: BoundaryValueCase, mesh: Mesh, height: float) -> float:
     """Return the weight per area of the zones above a height."""
     layers = [
-        (*_heights(mesh, zone), table.unit_weight)
-        for name, table in case.material.items()
+        (*_heights(mesh, zone), effective_weights(case, name))
+        for name in case.material
         for zone in zones_of(case, name, mesh)
         if zone not in absent_at_first(case)
     ]
-    levels = sorted({level for low, high, _ in layers for level in (low, high)} | {height})
+    table = table_level(case)
+    levels = sorted({level for low, high, _ in layers for level in (low, high, min(max(table, low), high))} | {height})
     total = 0.0
     for low, high in pairwise(level for level in levels if level >= height):
-        weights = {weight for bottom, top, weight in layers if bottom < high and top > low}
+        weights = {weight[low < table] for bottom, top, weight in layers if bottom < high and top > low}
         if len(weights) > 1:
             raise ValueError(
                 f"zones of different unit weight lie side by side at height {low:g}; turn gravity on in a load stage"

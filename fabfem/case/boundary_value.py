@@ -7,6 +7,7 @@ from pydantic import Field
 from fabfem.case.schema import AnyScene, Case
 from fabfem.case.stages import AnyStage, Component, Support
 from fabfem.case.table import Factors, Identifier, Names, NotNegative, Positive, Table, Text
+from fabfem.case.water import Water
 
 
 class Scene(AnyScene):
@@ -45,18 +46,18 @@ class Solver(Table):
 
 
 class Probe(Table):
-    """A displacement written to the history."""
+    """A displacement, or a pore pressure, written to the history."""
 
     name: Identifier
     """Name of the column."""
-    kind: Literal["displacement"] = "displacement"
+    kind: Literal["displacement", "pore_pressure"] = "displacement"
     """What is probed."""
     boundary: Names | None = None
     """Boundaries over whose nodes the mean is taken."""
     point: Annotated[tuple[float, ...], Field(min_length=2, max_length=3, strict=False)] | None = None
     """Point whose nearest node is taken, instead of a boundary."""
-    component: Component
-    """Component of the displacement."""
+    component: Component | None = None
+    """Component of the displacement; a pore pressure has none."""
     scale: float = 1.0
     """Factor on the value."""
 
@@ -109,6 +110,8 @@ class BoundaryValueCase(Case):
     """Supports of all stages."""
     stage: Annotated[tuple[AnyStage, ...], Field(min_length=1, strict=False)]
     """Stages, in order."""
+    water: Water | None = None
+    """Water in the pores; a scene without it is dry."""
     solver: Solver = Solver()
     """Solution of the equations."""
     probe: Annotated[tuple[Probe, ...], Field(strict=False)] = ()

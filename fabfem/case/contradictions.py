@@ -16,6 +16,7 @@ def contradictions(case: BoundaryValueCase) -> Iterator[tuple[str, str]]:
     yield from _impossible_together(case)
     yield from _odd_columns(case)
     yield from _odd_zones(case)
+    yield from _odd_water(case)
 
 
 def _odd_columns(case: BoundaryValueCase) -> Iterator[tuple[str, str]]:
@@ -29,6 +30,36 @@ def _odd_columns(case: BoundaryValueCase) -> Iterator[tuple[str, str]]:
     for probe in case.probe:
         if (probe.boundary is None) == (probe.point is None):
             yield f"probe[{probe.name}]", "needs either a boundary or a point"
+        if (probe.component is None) != (probe.kind == "pore_pressure"):
+            yield f"probe[{probe.name}].component", "goes with a displacement, and only with that"
+        if probe.kind == "pore_pressure" and case.water is None:
+            yield f"probe[{probe.name}].kind", "asks for a pore pressure, but the case has no [water]"
+
+
+def _odd_water(case: BoundaryValueCase) -> Iterator[tuple[str, str]]:
+    """Yield what does not fit the water of the case, or its absence."""
+    excess = case.water is not None and case.water.excess
+    wet = False
+    for stage in case.stage:
+        drainage = stage.drainage if isinstance(stage, Load) else "drained"
+        if drainage != "drained" and not excess:
+            yield f"stage[{stage.name}].drainage", f"'{drainage}' needs [water] with excess = true"
+        if wet and drainage == "drained":
+            yield f"stage[{stage.name}]", "is drained after excess pressures arose; let them flow off by seepage"
+        if isinstance(stage, Load) and stage.drains and drainage != "seepage":
+            yield f"stage[{stage.name}].drains", "lets water off, but the stage has no seepage"
+        wet = wet or drainage != "drained"
+    if any(isinstance(stage, Load) and stage.drainage == "seepage" for stage in case.stage):
+        for name, material in case.material.items():
+            if material.conductivity == 0.0:
+                yield f"material.{name}.conductivity", "is missing; water is to flow through the pores"
+    if case.water is None or case.water.level is None:
+        return
+    for name, material in case.material.items():
+        if material.unit_weight > 0.0 and material.saturated_unit_weight is None:
+            yield f"material.{name}.saturated_unit_weight", "is missing; there is a water table"
+        if material.saturated_unit_weight is not None and material.saturated_unit_weight < case.water.unit_weight:
+            yield f"material.{name}.saturated_unit_weight", "is less than the unit weight of water"
 
 
 def _impossible_together(case: BoundaryValueCase) -> Iterator[tuple[str, str]]:
@@ -72,7 +103,7 @@ def _unknown_components(case: BoundaryValueCase) -> Iterator[tuple[str, str]]:
 def _components(case: BoundaryValueCase) -> Iterator[tuple[str, str]]:
     for number, support in enumerate(case.support, 1):
         yield from ((f"support[{number}].fix", component) for component in support.fix)
-    yield from ((f"probe[{probe.name}].component", probe.component) for probe in case.probe)
+    yield from ((f"probe[{probe.name}].component", probe.component) for probe in case.probe if probe.component)
     yield from ((f"reaction[{entry.name}].component", entry.component) for entry in case.reaction)
     for stage in case.stage:
         vectors: dict[str, tuple[Vector, ...]] = {"traction": stage.traction}

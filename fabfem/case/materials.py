@@ -21,7 +21,13 @@ class Material(Table):
     zones: SomeNames | None = None
     """Zones of the mesh made of this material at first, [] for none; all zones when left out."""
     unit_weight: NotNegative = 0.0
-    """Unit weight that gravity acts on (buoyant below a water table)."""
+    """Unit weight that gravity acts on, above the water table."""
+    saturated_unit_weight: Positive | None = None
+    """Unit weight of soil and water together below the water table; gravity acts on it less that of water."""
+    conductivity: NotNegative = 0.0
+    """Hydraulic conductivity (k), for scenes where excess pore pressure flows off [length/time]."""
+    porosity: Annotated[float, Field(gt=0, lt=1)] | None = None
+    """Volume of pores over the whole, for compressible water; a Chang-Hicher material has it from its void ratio."""
 
 
 class Elastic(Material):

@@ -249,6 +249,12 @@ class Load(Stage):
     """Zones that change their material."""
     control: AnyControl | None = None
     """What drives the stage instead of its time, so that loads may fall."""
+    drainage: Literal["drained", "undrained", "seepage"] = "drained"
+    """Whether excess pore pressure is zero, stays where it arises, or flows off."""
+    drains: Names | None = None
+    """Boundaries where water flows off freely; the others let nothing through."""
+    time_tolerance: NotNegative = 0.001
+    """Error of a time step of seepage, relative to the largest excess pressure; 0 leaves steps to the increments."""
     zero_displacement: bool = False
     """Whether displacements count from zero again once the stage is done."""
     gravity: NotNegative | None = None

@@ -18,9 +18,9 @@ from fabfem.fem.supports import MOTIONS, RigidBody, body_modes
 
 @dataclass(frozen=True)
 class Gravity:
-    """Weight; unit weights [force/volume] by zone, a zone not named weighs nothing; direction along the components."""
+    """Weight; unit weights [force/volume] by zone, or at the points of a zone; a zone not named weighs nothing."""
 
-    unit_weights: Mapping[str, float]
+    unit_weights: Mapping[str, float | np.ndarray]
     direction: tuple[float, ...] | None = None
     start: float = 1.0
     end: float = 1.0
@@ -113,13 +113,13 @@ def nodal_force(load: object, space: Space) -> np.ndarray:
 
 @nodal_force.register
 def _(load: Gravity, space: Space) -> np.ndarray:
-    density = np.zeros(len(space.mesh.cells))
+    density = np.zeros(space.npoints)
     for zone, weight in load.unit_weights.items():
-        density[space.mesh.zone(zone)] = weight
+        density[space.points_of(space.mesh.zone(zone))] = weight
     down = np.zeros(len(space.components))
     down[space.mesh.dim - 1] = -1.0
     direction = down if load.direction is None else _checked(space, load.direction, "the direction of gravity")
-    share = np.einsum("e,eq,qa->ea", density, space.weights.reshape(-1, space.nq), space.values)
+    share = (density * space.weights).reshape(-1, space.nq) @ space.values
     return _gather(space, space.mesh.cells, share[:, :, None] * direction)
 
 
@@ -155,14 +155,23 @@ def _(load: BodyForce, space: Space) -> np.ndarray:
 
 
 def k0_stress(
-    space: Space, points: slice | np.ndarray, level: float, unit_weight: float, k0: float, surcharge: float = 0.0
+    space: Space,
+    points: slice | np.ndarray,
+    level: float,
+    unit_weight: float,
+    k0: float,
+    surcharge: float = 0.0,
+    table: float = -np.inf,
+    buoyant_weight: float = 0.0,
 ) -> np.ndarray:
-    """(n, 6) stress of level ground: σ_v = γ·depth + surcharge, σ_h = K0·σ_v, at points of `space`.
+    """(n, 6) effective stress of level ground: σ_v = γ·depth + surcharge, σ_h = K0·σ_v, at points of `space`.
 
-    `level` [length] is the height of the surface. Raises ValueError where a point would be pulled or not loaded.
+    `level` [length] is the height of the surface; below the height `table` the soil has its buoyant weight. Raises
+    ValueError where a point would be pulled or not loaded.
     """
     up = space.mesh.dim - 1
-    vertical = unit_weight * (level - space.points[points, up]) + surcharge
+    depth, wet = level - space.points[points, up], np.maximum(min(table, level) - space.points[points, up], 0.0)
+    vertical = unit_weight * (depth - wet) + buoyant_weight * wet + surcharge
     if vertical.min() <= 0.0:
         height = space.points[points, up][vertical.argmin()]
         raise ValueError(f"the K0 stress is {vertical.min():g} at height {height:g}, above the surface {level:g}.")

@@ -171,19 +171,33 @@ def water_of(space: PorousSpace, pattern: Pattern, water: PoreWater, flows: bool
     return Water(coupling, seepage, duration, space.nmotion)
 
 
-def pace_error(
-    water: Water, unknowns: np.ndarray, new: tuple[np.ndarray, float], last: tuple[np.ndarray, float] | None
-) -> float:
-    """The local error of backward Euler in the pressures, Δt/2 |ṗ_new − ṗ_last|, over the largest pressure.
+class Pace:
+    """The error of the time steps of a stage where water flows, over what the stage allows."""
 
-    `new` and `last` are steps (ndof,) and their sizes; before the first step of a stage there is no estimate.
-    """
-    if last is None:
-        return 0.0
-    pressures = slice(water.nmotion, None)
-    change = new[0][pressures] / new[1] - last[0][pressures] / last[1]
-    largest = np.abs(unknowns[pressures]).max()
-    return float(0.5 * new[1] * np.abs(change).max() / largest) if largest > 0.0 else 0.0
+    def __init__(self, water: Water | None, tolerance: float) -> None:
+        self._water = water if water is not None and water.seepage is not None and tolerance > 0.0 else None
+        self._tolerance = tolerance
+        self._rate: np.ndarray | None = None
+        self._largest = 0.0
+
+    def error(self, start: np.ndarray, step: np.ndarray, size: float) -> float:
+        """The local error of backward Euler, Δt/2 |ṗ − ṗ_last| over the largest pressure so far, over the tolerance.
+
+        `start` and `step` are unknowns (ndof,), `size` is the part of the stage. It is 0 before a second step.
+        """
+        if self._water is None or self._rate is None:
+            return 0.0
+        pressures = slice(self._water.nmotion, None)
+        largest = max(self._largest, float(np.abs(start[pressures]).max()))
+        change = np.abs(step[pressures] / size - self._rate).max()
+        return float(0.5 * size * change / (largest * self._tolerance)) if largest > 0.0 else 0.0
+
+    def keep(self, start: np.ndarray, step: np.ndarray, size: float) -> None:
+        """Take a step as done."""
+        if self._water is not None:
+            pressures = slice(self._water.nmotion, None)
+            self._rate = step[pressures] / size
+            self._largest = max(self._largest, float(np.abs(start[pressures]).max()))
 
 
 def _assembled(space: PorousSpace, pattern: Pattern, local: np.ndarray) -> csr_matrix:

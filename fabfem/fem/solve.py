@@ -24,9 +24,9 @@ from fabfem.fem.increment import (
 )
 from fabfem.fem.linear import make_solver
 from fabfem.fem.loads import Loading, loading
-from fabfem.fem.model import Model, Refusal, Zone, elastic_tangents, stress_of, symmetric, weaken
+from fabfem.fem.model import Controls, Model, Refusal, Zone, elastic_tangents, stress_of, symmetric, weaken
 from fabfem.fem.newton import solve_increment
-from fabfem.fem.pores import Water, pace_error, water_of
+from fabfem.fem.pores import Pace, Water, water_of
 from fabfem.fem.space import Space
 from fabfem.fem.stages import ArcLength, DisplacementControl, Stage, StrengthSearch
 from fabfem.fem.supports import constrain, reduction
@@ -44,9 +44,6 @@ COURSES = {
 
 TOO_FAST = 4.0
 """Error of a time step, over what the stage allows, at which it is done again."""
-
-Last = tuple[np.ndarray, float] | None
-"""The last increment of the stage: its (ndof,) step and its size."""
 
 Course = Generator[Increment | Stopped | Collapsed, None, tuple[Equilibrium | None, int]]
 
@@ -159,10 +156,10 @@ def _course(place: Place, system: System, now: Equilibrium) -> Course:
 def _through(place: Place, system: System, now: Equilibrium, load: Loading) -> Course:
     """Yield the increments of a stage; return its last equilibrium, None where it stopped, and their number so far."""
     stage, fraction, size, number = place.stage, 0.0, place.stage.first, place.number
-    guess, last = None, None
+    guess, pace = None, Pace(system.water, stage.time_tolerance)
     while fraction < 1.0:
         spent = dict(system.timer.spent)
-        step = _tried(stage, system, load, now, fraction, size, guess, last)
+        step = _tried(stage, system, load, now, fraction, size, guess, pace)
         trial = step.solved.end
         if isinstance(trial, Refusal):
             timings = system.timer.since(spent)
@@ -171,7 +168,8 @@ def _through(place: Place, system: System, now: Equilibrium, load: Loading) -> C
         number, fraction, old = number + 1, step.fraction, now
         now = advanced(old, trial)
         yield increment(place, number, system, old, now, step, trial, system.timer.since(spent))
-        size, last = _next_size(stage, system, now, step, last), (trial.step, step.size)
+        size = _next_size(stage, system.controls, step, pace.error(old.displacement, trial.step, step.size))
+        pace.keep(old.displacement, trial.step, step.size)
         guess = _extrapolated(system, trial.step, step.size, min(size, 1.0 - fraction))
     return now, number
 
@@ -184,7 +182,7 @@ def _tried(
     fraction: float,
     size: float,
     guess: np.ndarray | None,
-    last: Last,
+    pace: Pace,
 ) -> Step:
     """The increment after `fraction`, made smaller until it converges or its size is below the stage's smallest."""
     cutbacks: tuple[Cutback, ...] = ()
@@ -194,34 +192,25 @@ def _tried(
         size = target - fraction
         forces = load.total(target)
         solved = solve_increment(system, now, forces, size, guess)
-        end = solved.end
+        answer = solved.end
         may_shrink = 0.5 * size >= stage.smallest
-        if isinstance(end, Trial) and may_shrink and _pace(stage, system, now, (end.step, size), last) > TOO_FAST:
-            end = Refusal("the pore pressure changes faster than the time step can follow")
-        if isinstance(end, Trial):
+        if isinstance(answer, Trial) and may_shrink and pace.error(now.displacement, answer.step, size) > TOO_FAST:
+            answer = Refusal("the pore pressure changes faster than the time step can follow")
+        if isinstance(answer, Trial):
             return Step(solved, target, size, forces, load.on_soil(target), cutbacks)
-        cutbacks += (Cutback(stage.name, fraction, size, *end),)
+        cutbacks += (Cutback(stage.name, fraction, size, *answer),)
         size, guess = 0.5 * size, None
         if size < stage.smallest:
-            return Step(solved._replace(end=end), target, size, forces, forces, cutbacks)
+            return Step(solved._replace(end=answer), target, size, forces, forces, cutbacks)
 
 
-def _next_size(stage: Stage, system: System, now: Equilibrium, step: Step, last: Last) -> float:
-    """The size to try next: larger after an easy increment that needed no cut-back, as the flow of water allows."""
-    controls, end = system.controls, step.solved.end
+def _next_size(stage: Stage, controls: Controls, step: Step, pace: float) -> float:
+    """The size to try next: larger after an easy increment without cut-back, as far as the flow of water allows."""
     easy = step.solved.iterations <= controls.easy and not step.cutbacks
     growth = controls.growth if easy else 1.0
-    pace = _pace(stage, system, now, (end.step, step.size), last) if isinstance(end, Trial) else 0.0
     if pace > 0.0:
         growth = float(np.clip(0.9 * pace**-0.5, 0.3, growth))
-    return min(step.size * growth, stage.largest)
-
-
-def _pace(stage: Stage, system: System, now: Equilibrium, new: tuple[np.ndarray, float], last: Last) -> float:
-    """The error of a time step over what the stage allows; 0 where nothing flows or nothing is asked."""
-    if system.water is None or system.water.seepage is None or stage.time_tolerance == 0.0:
-        return 0.0
-    return pace_error(system.water, now.displacement, new, last) / stage.time_tolerance
+    return float(np.clip(step.size * growth, stage.smallest, stage.largest))
 
 
 def _extrapolated(system: System, last: np.ndarray, last_size: float, size: float) -> np.ndarray | None:
