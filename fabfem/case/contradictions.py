@@ -46,6 +46,8 @@ def _odd_water(case: BoundaryValueCase) -> Iterator[tuple[str, str]]:
             yield f"stage[{stage.name}].drainage", f"'{drainage}' needs [water] with excess = true"
         if wet and drainage == "drained":
             yield f"stage[{stage.name}]", "is drained after excess pressures arose; let them flow off by seepage"
+        if isinstance(stage, Load) and stage.control and drainage != "drained":
+            yield f"stage[{stage.name}].control", "drives drained stages only"
         if isinstance(stage, Load) and stage.drains and drainage != "seepage":
             yield f"stage[{stage.name}].drains", "lets water off, but the stage has no seepage"
         wet = wet or drainage != "drained"

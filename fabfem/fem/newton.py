@@ -94,7 +94,8 @@ def _first_that_works(
 def _extended(system: System, old: Equilibrium, task: Task, tangent: np.ndarray) -> Trial | Refusal:
     """The trial of one linear step from `old` to the new load and held dofs."""
     matrix = stiffness_of(system, task, tangent)
-    correction = solved(system, matrix, system.constraints.collect(task.load - task.start - matrix @ task.motion))
+    start = old.force if task.start is None else task.start
+    correction = solved(system, matrix, system.constraints.collect(task.load - start - matrix @ task.motion))
     if isinstance(correction, Refusal):
         return correction
     return attempt(system, old, task, task.motion + system.constraints.spread(correction))

@@ -26,7 +26,7 @@ from fabfem.fem.linear import make_solver
 from fabfem.fem.loads import Loading, loading
 from fabfem.fem.model import Controls, Model, Refusal, Zone, elastic_tangents, stress_of, symmetric, weaken
 from fabfem.fem.newton import solve_increment
-from fabfem.fem.pores import Pace, Water, water_of
+from fabfem.fem.pores import Pace, PorousSpace, Water, water_of
 from fabfem.fem.space import Space
 from fabfem.fem.stages import ArcLength, DisplacementControl, Stage, StrengthSearch
 from fabfem.fem.supports import constrain, reduction
@@ -98,7 +98,7 @@ def _system(
 ) -> System:
     gone = absent_dofs(model.space, {name: zones[name] for name in stage.absent})
     water = _water(model, stage, pattern)
-    if model.water is not None and water is None:
+    if isinstance(model.space, PorousSpace) and water is None:
         gone = np.union1d(gone, np.arange(model.space.nmotion, model.space.ndof))
     constraints = constrain(model.space, stage.supports, stage.bodies, gone)
     reduce = reduction(pattern, constraints)
@@ -111,7 +111,7 @@ def _system(
 
 def _water(model: Model, stage: Stage, pattern: Pattern) -> Water | None:
     """What pore water does in a stage; None where there is none, or its excess pressure is zero."""
-    if model.water is None or stage.drainage == "drained":
+    if model.water is None or not isinstance(model.space, PorousSpace) or stage.drainage == "drained":
         return None
     return water_of(model.space, pattern, model.water, stage.drainage == "seepage", stage.duration)
 

@@ -58,9 +58,9 @@ class Task(NamedTuple):
     """(ndof,) displacement in it of the dofs that are no unknowns."""
     viscous: np.ndarray | None
     """(npoints, 6, 6) viscous stress by strain increment, where there is viscosity."""
-    start: np.ndarray
-    """(ndof,) internal force at its start, water included."""
-    wet: csr_matrix | None
+    start: np.ndarray | None = None
+    """(ndof,) internal force at its start, where that is not the skeleton's alone."""
+    wet: csr_matrix | None = None
     """What water adds to the stiffness."""
 
 
@@ -95,7 +95,7 @@ def make_task(system: System, old: Equilibrium, load: np.ndarray, size: float) -
         viscous = eta / size * elastic_tangents(system.zones, old.states, system.space.npoints)
     motion = size * system.constraints.motion
     if system.water is None:
-        return Task(load, motion, viscous, old.force, None)
+        return Task(load, motion, viscous)
     _let_out(system, old, motion)
     return Task(load, motion, viscous, begun(system, old, size), system.water.matrix(size))
 
@@ -141,7 +141,7 @@ def mechanical(system: System, values: np.ndarray) -> np.ndarray:
 
 
 def _water(old: Equilibrium, task: Task, step: np.ndarray) -> np.ndarray:
-    if task.wet is None:
+    if task.wet is None or task.start is None:
         return np.zeros(len(step))
     return task.start - old.force + task.wet @ step
 
