@@ -155,13 +155,10 @@ class Water(NamedTuple):
         return force if self.seepage is None else force - size * self.duration * (self.seepage @ pressure)
 
     def misfit(self, step: np.ndarray, volumes: np.ndarray, unknown: np.ndarray) -> float:
-        """The norm of the volumes (ndof,) left over at dofs `unknown`, over that of the volumes squeezed out."""
+        """The norm of the volumes (ndof,) left over at dofs `unknown`, over that of all volumes that go to and fro."""
         left = norm(volumes[unknown[unknown >= self.nmotion]])
-        motion = step.copy()
-        motion[self.nmotion :] = 0.0
-        squeezed = norm((self.coupling @ motion)[self.nmotion :])
-        flowing = norm(volumes[self.nmotion :]) if squeezed == 0.0 else squeezed
-        return left / flowing if flowing > 0.0 else 0.0
+        moved = norm((abs(self.coupling) @ np.abs(step))[self.nmotion :])
+        return left / moved if moved > 0.0 else 0.0
 
 
 def water_of(space: PorousSpace, pattern: Pattern, water: PoreWater, flows: bool, duration: float) -> Water:
