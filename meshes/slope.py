@@ -1,7 +1,7 @@
 """Make the slope meshes: 8-node quadrilaterals, finest where the slip surfaces run.
 
-Every slope falls to the right, its toe at the origin. The boundaries are left, right, bottom, crest, face, toe (the level
-ground before it, where there is some); the zone above the toe is "slope", below it "ground". Needs gmsh
+Every slope falls to the right, its toe at the origin. The boundaries are left, right, bottom, crest, face, toe (the
+level ground before it, where there is some); the zone above the toe is "slope", below it "ground". Needs gmsh
 (``pip install gmsh``): ``python meshes/slope.py [FOLDER]`` writes one file for each slope of `SLOPES`.
 """
 

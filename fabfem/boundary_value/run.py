@@ -8,8 +8,8 @@ from fabfem.boundary_value.audit import audited
 from fabfem.boundary_value.omitted import remaining
 from fabfem.boundary_value.problem import Problem, build
 from fabfem.boundary_value.record import PHASES, Recorder
-from fabfem.case import BoundaryValueCase
 from fabfem.boundary_value.safety import sentence
+from fabfem.case import BoundaryValueCase
 from fabfem.fem.flow import UNDECIDED
 from fabfem.fem.increment import Collapsed, Increment, Stopped
 from fabfem.fem.solve import march

@@ -164,9 +164,7 @@ class Step(NamedTuple):
 
 def advanced(old: Equilibrium, trial: Trial) -> Equilibrium:
     """The equilibrium that a trial ends in."""
-    return Equilibrium(
-        old.displacement + trial.step, trial.batch.states, trial.force - trial.drag, trial.batch.tangent
-    )
+    return Equilibrium(old.displacement + trial.step, trial.batch.states, trial.force - trial.drag, trial.batch.tangent)
 
 
 def largest(system: System, displacement: np.ndarray) -> float:

@@ -77,6 +77,7 @@ class ArcLength:
 
 Goal = StrengthSearch | DisplacementControl | ArcLength
 
+
 @dataclass(frozen=True)
 class Stage:
     """One part of a run. It holds only what it names: repeat fixities and gravity in every stage.
