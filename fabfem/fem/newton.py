@@ -148,6 +148,8 @@ def stiffness_of(system: System, task: Task, tangent: np.ndarray) -> csr_matrix:
 
 def solved(system: System, matrix: csr_matrix, rhs: np.ndarray) -> np.ndarray | Refusal:
     """The unknowns that a force on them moves, under a stiffness (ndof, ndof), or why not."""
+    if not len(rhs):  # everything is held
+        return rhs
     with system.timer.phase("linear_solve"):
         system.solver.factor(system.reduce(matrix))
         solution = system.solver.solve(rhs)
