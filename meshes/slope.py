@@ -1,7 +1,7 @@
 """Make the slope meshes: 8-node quadrilaterals, finest where the slip surfaces run.
 
-Every slope falls to the right, its toe at the origin. The boundaries are left, right, bottom, crest, face, toe (the level
-ground before it, where there is some); the zone above the toe is "slope", below it "ground". Needs gmsh
+Every slope falls to the right, its toe at the origin. The boundaries are left, right, bottom, crest, face, toe (the
+level ground before it, where there is some); the zone above the toe is "slope", below it "ground". Needs gmsh
 (``pip install gmsh``): ``python meshes/slope.py [FOLDER]`` writes one file for each slope of `SLOPES`.
 """
 
@@ -32,7 +32,7 @@ class Slope(NamedTuple):
 
 SLOPES = {
     "slope_2to1": Slope(height=10.0, run=20.0, crest=12.0, fine=0.45, coarse=1.0),
-    "slope_2to1_coarse": Slope(height=10.0, run=20.0, crest=10.0, fine=1.2, coarse=1.8),
+    "slope_2to1_coarse": Slope(height=10.0, run=20.0, crest=10.0, fine=2.0, coarse=2.5),
     "slope_45": Slope(height=10.0, run=10.0, crest=12.0, toe=8.0, depth=5.0, fine=0.5, coarse=1.5),
     "slope_2to1_ground": Slope(height=10.0, run=20.0, crest=12.0, toe=10.0, depth=5.0, fine=0.6, coarse=1.6),
 }

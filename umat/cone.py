@@ -7,7 +7,8 @@ is that of the elastic trial stress, so the return is one of the pair (p, q),
     p = p_tr + K β Δκ,   q = q_tr − 3 G Δκ,   Δκ = f_tr / (3 G + M K β + H),
 
 or, if that overshoots q = 0, to the apex q = 0, p = −k/M with Δκ = q_tr/3G, which joins
-it continuously.  With H < 0 the strength k falls to a residual one, where H is zero.  With M = β = 0 the cone is von Mises' cylinder, which has no apex
+it continuously.  With H < 0 the strength k falls to a residual one, where H is zero.
+With M = β = 0 the cone is von Mises' cylinder, which has no apex
 (de Souza Neto, Perić & Owen 2008, boxes 7.3, 8.8 to 8.10, compression positive).
 """
 

@@ -61,9 +61,7 @@ def _(material: VonMises) -> bool:
 @state_fields.register
 def _(material: VonMises, state: PlasticState) -> dict[str, Array]:
     plastic_strain = state.plastic_strain
-    strength = np.maximum(
-        material.yield_stress + material.hardening_modulus * plastic_strain, material.residual_stress
-    )
+    strength = np.maximum(material.yield_stress + material.hardening_modulus * plastic_strain, material.residual_stress)
     return {
         "plastic_strain": plastic_strain,
         "mobilised_strength": q(state.stress) / strength,

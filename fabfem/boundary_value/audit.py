@@ -28,7 +28,7 @@ def audited(problem: Problem, increment: Increment) -> bool:
 def audit(problem: Problem, increment: Increment) -> dict[str, Any]:
     """Return the audit of the stage that an increment ends."""
     geostatic = isinstance(problem.case.stage[increment.stage_index], Geostatic)
-    found = {
+    found: dict[str, Any] = {
         "stage": increment.stage,
         "out_of_balance": increment.out_of_balance if geostatic else increment.residuals[-1],
         "moved": float(np.linalg.norm(problem.model.space.displacement(increment.displacement), axis=1).max()),
@@ -55,9 +55,7 @@ def _worst(problem: Problem, increment: Increment) -> dict[str, Any]:
     """Return where the guess was most out of balance, and on which boundaries that is."""
     model, stage = problem.model, problem.model.stages[increment.stage_index]
     space = model.space
-    force = increment.external_force - space.internal_force(
-        stress_of(increment.zones, increment.before, space.npoints)
-    )
+    force = increment.external_force - space.internal_force(stress_of(increment.zones, increment.before, space.npoints))
     kept = constrain(space, stage.supports, stage.bodies).keep_unknown(force)
     node, component = divmod(int(np.abs(kept).argmax()), len(space.components))
     on = [name for name, facets in space.mesh.boundaries.items() if (facets == node).any()]

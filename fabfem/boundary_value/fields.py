@@ -35,7 +35,7 @@ AT_NODES: dict[str, Callable[[Increment], Array]] = {
     "displacement": lambda increment: increment.displacement,
     "displacement_increment": lambda increment: increment.step,
 }
-"""Fields that nodes have: the displacement, counted from where a stage last set it to zero, and that of the increment."""
+"""Fields of nodes: the displacement, counted from where a stage last set it to zero, and that of the increment."""
 
 OF_MOTION: dict[str, Callable[[Space, Increment], Array]] = {
     "strain": lambda space, increment: space.strain(increment.displacement),

@@ -121,7 +121,9 @@ def _spare(substances: Mapping[str, Substance], zones: Mapping[str, Zone]) -> It
     used = [zone.material for zone in zones.values()]
     for name, spare in substances.items():
         if spare.material not in used:
-            state = umat.initial_state(spare.material, spare.directions, np.eye(1, 6) + np.eye(1, 6, 1) + np.eye(1, 6, 2), **spare.needs)
+            state = umat.initial_state(
+                spare.material, spare.directions, np.eye(1, 6) + np.eye(1, 6, 1) + np.eye(1, 6, 2), **spare.needs
+            )
             yield f"[{name}]", Zone(spare.material, spare.directions, state, slice(0, 0))
 
 

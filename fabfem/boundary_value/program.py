@@ -163,7 +163,9 @@ def _table(said: stages.Ramped, value: float, duration: float) -> Table:
         return ()
     times, factors = np.transpose(said.ramp)
     known = {*(times / duration), 0.0, 1.0}
-    return tuple((float(at), float(value * np.interp(at * duration, times, factors))) for at in sorted(known) if at <= 1)
+    return tuple(
+        (float(at), float(value * np.interp(at * duration, times, factors))) for at in sorted(known) if at <= 1
+    )
 
 
 def _acts(key: tuple[str, ...], bodies: Sequence[RigidBody]) -> bool:
@@ -194,7 +196,7 @@ def _body(space: Space, said: stages.Rigid) -> RigidBody:
         raise ValueError(f"a smooth rigid body needs a boundary along an axis, which '{said.boundary}' is not")
     ties = (space.components[across],) if said.contact == "smooth" else space.components
     point = tuple(0.5 * (low + high)) if said.point is None else said.point
-    return RigidBody(said.boundary, ties, point, dict(said.motion))
+    return RigidBody(said.boundary, ties, point, {str(name): value for name, value in said.motion.items()})
 
 
 def _changes(scene: Scene, said: AnyStage) -> Iterator[tuple[str, Change]]:
@@ -215,7 +217,9 @@ def _goal(said: AnyStage) -> Goal | None:
         return StrengthSearch(said.step, said.largest, said.tolerance, said.growth)
     control = said.control if isinstance(said, Load) else None
     if isinstance(control, stages.DisplacementControl):
-        terms = [(name, term.component, term.factor / len(term.boundary)) for term in control.terms for name in term.boundary]
+        terms = [
+            (name, term.component, term.factor / len(term.boundary)) for term in control.terms for name in term.boundary
+        ]
         return DisplacementControl(tuple(terms), control.change)
     return None if control is None else ArcLength(control.length)
 

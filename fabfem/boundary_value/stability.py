@@ -20,7 +20,11 @@ ANGLES = 90
 """Directions in the plane, over half a turn."""
 LATITUDES = 12
 """Circles of directions on half a sphere, for solids."""
-BATCH = 2000
+CLOSER = 3
+"""Times that the directions are drawn closer around the best."""
+LOST = 1e-4
+"""Determinant over the elastic one at which a band may form; perfectly plastic materials come to zero from above."""
+BATCH = 1000
 """Points treated at once."""
 
 
@@ -39,15 +43,14 @@ def acoustic_determinant(space: Space, increment: Increment) -> Array:
     ratio = np.ones(space.npoints)
     for name, zone in increment.zones.items():
         elastic = umat.elastic_tangent(zone.material, increment.states[name])
-        least = _least(increment.tangent[zone.points], elastic, normals)
-        ratio[zone.points] = least
+        ratio[zone.points] = _least(increment.tangent[zone.points], elastic, normals)
     return ratio
 
 
 def localisation(space: Space, increment: Increment) -> dict[str, Any]:
     """Return the report's entry on the first increment after which a band may form, empty as long as none may."""
     least = acoustic_determinant(space, increment)
-    lost = np.flatnonzero(least <= 0.0)
+    lost = np.flatnonzero(least <= LOST)
     if not len(lost):
         return {}
     worst = int(np.argmin(least))
@@ -55,33 +58,54 @@ def localisation(space: Space, increment: Increment) -> dict[str, Any]:
         "localisation": {
             **{"stage": increment.stage, "increment": increment.number, "points": len(lost)},
             **{"at": space.points[worst].tolist(), "determinant": float(least[worst])},
-            "meaning": "from here on a band may form whose width is that of an element: what follows depends on the mesh",
+            "meaning": "from here on a band may form, as wide as an element: what follows depends on the mesh",
         }
     }
 
 
 def _least(tangent: Array, elastic: Array, normals: Array) -> Array:
+    """Return the least ratio (n,) over directions (m, 3), then over closer and closer ones around the best."""
     found = np.empty(len(tangent))
     for begin in range(0, len(tangent), BATCH):
         part = slice(begin, begin + BATCH)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            ratio = determinants(tangent[part], normals) / determinants(elastic[part], normals)
-        found[part] = np.min(ratio, axis=1)
+        pair = tangent[part], elastic[part]
+        around = np.broadcast_to(normals, (len(pair[0]), *normals.shape))
+        apart = np.pi / ANGLES if not normals[:, 2].any() else 0.5 * np.pi / LATITUDES
+        for _ in range(CLOSER):
+            ratio = _ratio(*pair, around)
+            best = np.take_along_axis(around, ratio.argmin(axis=1)[:, None, None], axis=1)
+            around, apart = _about(best, apart, normals), 0.25 * apart
+        found[part] = np.minimum(ratio.min(axis=1), _ratio(*pair, around).min(axis=1))
     return found
 
 
+def _about(best: Array, apart: float, normals: Array) -> Array:
+    """Return directions (n, k, 3) within an angle of the best ones (n, 1, 3), those among them; flat stays flat."""
+    steps = apart * np.arange(-4, 5) / 4.0
+    if not normals[:, 2].any():
+        offsets = np.stack([-best[..., 1], best[..., 0], np.zeros_like(best[..., 0])], axis=-1) * np.tan(steps)[:, None]
+    else:
+        offsets = np.stack(np.meshgrid(steps, steps, steps), axis=-1).reshape(1, -1, 3)
+    turned = best + offsets
+    return turned / np.linalg.norm(turned, axis=-1, keepdims=True)
+
+
+def _ratio(tangent: Array, elastic: Array, normals: Array) -> Array:
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return determinants(tangent, normals) / determinants(elastic, normals)
+
+
 def determinants(tangent: Array, normals: Array) -> Array:
-    """Return det A(n) (n, m) of tangents (n, 6, 6) and directions (m, 3), A_jk = n_i C_ijkl n_l.
+    """Return det A(n) (n, m) of tangents (n, 6, 6) and each one's directions (n, m, 3), A_jk = n_i C_ijkl n_l.
 
     With the (6, 3) operator N that makes the Mandel vector of sym(n ⊗ g) from g, A = Nᵀ C N.
     """
-    operator = np.zeros((len(normals), 6, 3))
+    operator = np.zeros((*normals.shape[:2], 6, 3))
     for a in range(6):
         i, j = ROW[a], COLUMN[a]
-        operator[:, a, i] += 0.5 * FACTOR[a] * normals[:, j]
-        operator[:, a, j] += 0.5 * FACTOR[a] * normals[:, i]
-    acoustic = np.einsum("mai,pab,mbj->pmij", operator, tangent, operator, optimize=True)
-    return np.linalg.det(acoustic)
+        operator[..., a, i] += 0.5 * FACTOR[a] * normals[..., j]
+        operator[..., a, j] += 0.5 * FACTOR[a] * normals[..., i]
+    return np.linalg.det(operator.swapaxes(-1, -2) @ (tangent[:, None] @ operator))
 
 
 def _directions(dim: int) -> Array:
@@ -92,5 +116,7 @@ def _directions(dim: int) -> Array:
     rows = []
     for polar in 0.5 * np.pi * np.arange(LATITUDES + 1) / LATITUDES:
         turns = 2.0 * np.pi * np.arange(n := max(1, round(4 * LATITUDES * np.sin(polar)))) / n
-        rows.append(np.stack([np.sin(polar) * np.cos(turns), np.sin(polar) * np.sin(turns), np.full(n, np.cos(polar))], 1))
+        rows.append(
+            np.stack([np.sin(polar) * np.cos(turns), np.sin(polar) * np.sin(turns), np.full(n, np.cos(polar))], 1)
+        )
     return np.concatenate(rows)

@@ -113,7 +113,9 @@ def _components(case: BoundaryValueCase) -> Iterator[tuple[str, str]]:
             vectors["displacement"] = stage.displacement
             if isinstance(stage.control, DisplacementControl):
                 place = f"stage[{stage.name}].control.terms"
-                yield from ((f"{place}[{n}].component", term.component) for n, term in enumerate(stage.control.terms, 1))
+                yield from (
+                    (f"{place}[{n}].component", term.component) for n, term in enumerate(stage.control.terms, 1)
+                )
         for kind, entries in vectors.items():
             for number, vector in enumerate(entries, 1):
                 yield from ((f"stage[{stage.name}].{kind}[{number}]", name) for name in vector.components())

@@ -19,7 +19,9 @@ def boundaries_of(case: BoundaryValueCase) -> Iterator[tuple[str, tuple[str, ...
             place = f"stage[{stage.name}].{kind}"
             yield from ((f"{place}[{number}].boundary", entry.boundary) for number, entry in enumerate(entries, 1))
         if isinstance(stage, Load):
-            yield from ((f"stage[{stage.name}].rigid[{n}].boundary", (e.boundary,)) for n, e in enumerate(stage.rigid, 1))
+            yield from (
+                (f"stage[{stage.name}].rigid[{n}].boundary", (e.boundary,)) for n, e in enumerate(stage.rigid, 1)
+            )
             if isinstance(stage.control, DisplacementControl):
                 place = f"stage[{stage.name}].control.terms"
                 yield from ((f"{place}[{n}].boundary", term.boundary) for n, term in enumerate(stage.control.terms, 1))
@@ -35,6 +37,8 @@ def zones_named(case: BoundaryValueCase) -> Iterator[tuple[str, tuple[str, ...]]
         if isinstance(stage, Load):
             yield f"{place}.remove", stage.remove or ()
             yield f"{place}.add", stage.add or ()
-            yield from ((f"{place}.change[{number}].zones", entry.zones) for number, entry in enumerate(stage.change, 1))
+            yield from (
+                (f"{place}.change[{number}].zones", entry.zones) for number, entry in enumerate(stage.change, 1)
+            )
         if isinstance(stage, StrengthReduction):
             yield f"{place}.excluded_zones", stage.excluded_zones or ()

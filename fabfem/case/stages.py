@@ -213,7 +213,7 @@ class Geostatic(Stage):
 class Gravity(Stage):
     """The state before anything is built, made by turning gravity on: for ground that is not level.
 
-    The soil is there from the start, without stress unless the stage gives one. Displacements are set to zero at its end.
+    The soil is there from the start, without stress unless the stage gives one. Displacements are zero at its end.
     """
 
     kind: Literal["gravity"]
@@ -242,7 +242,7 @@ class Load(Stage):
     remove: Names | None = None
     """Zones that are taken away; the forces that they exerted on the rest fade over the stage."""
     add: Names | None = None
-    """Zones that are put in place, without stress unless `initial_stress` gives one; their weight grows over the stage."""
+    """Zones that are put in place, without stress unless `initial_stress` gives one; their weight grows."""
     initial_stress: NotNegative = 0.0
     """Mean stress of the zones that are added [stress]."""
     change: Annotated[tuple[Change, ...], Field(strict=False)] = ()

@@ -56,7 +56,10 @@ def flow(system: System, now: Equilibrium, load: np.ndarray, enough: float) -> F
             size, halvings, why = 0.5 * size, halvings + 1, trial.reason
             continue
         old, now = now, flowed(now, trial)
-        drag, moved = relative(norm(trial.drag), trial.force, load), _largest(system, now.displacement - start.displacement)
+        drag, moved = (
+            relative(norm(trial.drag), trial.force, load),
+            _largest(system, now.displacement - start.displacement),
+        )
         reached = Flow(UNDECIDED, "", old, now, trial, drag, moved, iterations)
         if drag <= system.controls.tolerance:
             return reached._replace(verdict=EQUILIBRIUM)

@@ -11,8 +11,8 @@ Each correction is δu = u_r + δλ u_q, both from one factorisation of the stif
 u_q = g + T K⁻¹ Tᵀ(q - K g) [Batoz & Dhatt 1979]. The load may fall and, with either, the loaded displacement turn
 back. The fraction of the stage is that of Δs, or Δl, so far.
 
-Where the load does not change, as in a collapse of perfectly plastic ground, K is singular though the equations are not;
-a little of the elastic tangent is then added to it. At a sharp peak the sphere of the arc length is met behind it too:
+Where the load does not change, as in a collapse of perfectly plastic ground, K is singular, not so the equations; a
+little of the elastic tangent is then added to it. At a sharp peak the sphere of the arc length is met behind it too:
 where the way on is not found along the last tangent, it is looked for along that of the first trial, up and down, and a
 path that runs back along the last increment is refused.
 """
@@ -158,7 +158,8 @@ def _tried(
     size: float,
 ) -> tuple[Step, float]:
     """The increment after `fraction`, halved until it converges or is too small, and its load factor."""
-    stage, cutbacks = place.stage, ()
+    stage = place.stage
+    cutbacks: tuple[Cutback, ...] = ()
     while True:
         target = fraction + size if fraction + 1.001 * size < 1.0 else 1.0
         size = target - fraction
@@ -172,9 +173,7 @@ def _tried(
             return Step(solved, target, size, *forces, cutbacks), factor
 
 
-def _solve(
-    system: System, load: Loading, equation: Control, reached: Reached, size: float
-) -> tuple[Solved, float]:
+def _solve(system: System, load: Loading, equation: Control, reached: Reached, size: float) -> tuple[Solved, float]:
     """The increment that goes a part `size` of the stage further, and the load factor at its end."""
     first, factor = _predicted(system, load, equation, reached, size, reached.now.tangent, 0.0)
     answer, at = _iterated(system, load, equation, reached, size, first, factor)

@@ -1,7 +1,7 @@
 """What pushes: weight of zones, pressure and traction on boundaries; and the initial stress of level ground.
 
-A load is a fixed field times a factor that goes from `start` to `end` over the stage, or follows a table of (fraction of
-the stage, factor), linear in between.
+A load is a fixed field times a factor that goes from `start` to `end` over the stage, or follows a table of (fraction
+of the stage, factor), linear in between.
 """
 
 from collections.abc import Callable, Mapping, Sequence

@@ -145,6 +145,7 @@ def _least(system: System, trial: Trial, tried: list[Trial | Refusal]) -> Trial 
 
 
 def stiffness_of(system: System, task: Task, tangent: np.ndarray) -> csr_matrix:
+    """The (ndof, ndof) stiffness of a tangent (npoints, 6, 6) and of the viscosity of a task."""
     with system.timer.phase("assembly"):
         whole = tangent if task.viscous is None else tangent + task.viscous
         matrix = stiffness(system.space, system.pattern, whole)
@@ -154,6 +155,9 @@ def stiffness_of(system: System, task: Task, tangent: np.ndarray) -> csr_matrix:
 
 
 def solved(system: System, matrix: csr_matrix, rhs: np.ndarray) -> np.ndarray | Refusal:
+    """The unknowns that a force on them moves, under a stiffness (ndof, ndof), or why not."""
+    if not len(rhs):  # everything is held
+        return rhs
     with system.timer.phase("linear_solve"):
         system.solver.factor(system.reduce(matrix))
         solution = system.solver.solve(rhs)

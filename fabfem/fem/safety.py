@@ -81,7 +81,8 @@ def through(
     goal, number, start = place.stage.goal, place.number, now
     assert isinstance(goal, StrengthSearch)
     enough = goal.growth * elastic_displacement(system, now, load.total(1.0))
-    bracket, failed, cutbacks = Bracket(None, None, False), None, ()
+    bracket, cutbacks = Bracket(None, None, False), tuple[Cutback, ...]()
+    failed: Try | None = None
     tried: tuple[Factor, ...] = ()
     spent = dict(system.timer.spent)
     while not bracket.closed(goal):
@@ -110,9 +111,7 @@ def through(
     return None, number
 
 
-def _attempted(
-    place: Place, system: System, now: Equilibrium, load: Loading, factor: float, enough: float
-) -> Try:
+def _attempted(place: Place, system: System, now: Equilibrium, load: Loading, factor: float, enough: float) -> Try:
     """What comes of a factor after the equilibrium `now`."""
     weak = system._replace(zones=weaken(system.zones, factor, place.stage.spared))
     forces = load.total(1.0)
@@ -146,7 +145,8 @@ def _recorded(
 ) -> Increment:
     """The record of the increment that a factor ended with; a flow counts as one increment."""
     goal, trial, end = place.stage.goal, new.trial, _rest(new, now)
-    assert isinstance(goal, StrengthSearch) and trial is not None
+    assert isinstance(goal, StrengthSearch)
+    assert trial is not None
     fraction = min((new.factor - place.stage.strength) / (goal.largest - place.stage.strength), 1.0)
     step = Step(new.answer, fraction, goal.step, load.total(1.0), load.on_soil(1.0), cutbacks)
     begun = new.fluent.old if new.fluent and new.verdict != EQUILIBRIUM else now
@@ -156,7 +156,9 @@ def _recorded(
 
 def _cutback(place: Place, new: Try) -> Cutback:
     assert isinstance(new.answer.end, Refusal)
-    return Cutback(place.stage.name, 0.0, 0.0, f"strength divided by {new.factor:g}: {new.answer.end.reason}", new.answer.end.point)
+    return Cutback(
+        place.stage.name, 0.0, 0.0, f"strength divided by {new.factor:g}: {new.answer.end.reason}", new.answer.end.point
+    )
 
 
 def _verdict(bracket: Bracket, failed: Try | None) -> tuple[str, str]:

@@ -1,4 +1,4 @@
-"""What is held or tied: displacement components of boundaries, fixed or moved by a ramp, and rigid bodies on boundaries.
+"""What is held or tied: displacement components of boundaries, fixed or moved by a ramp, and rigid bodies.
 
 The nodal displacements of a stage are u = T v + f g: v the unknowns, g the motion over the whole stage, f the part of
 the stage that has passed. A free dof is its own unknown. A held dof has none. The tied dofs of a rigid body follow the
@@ -163,7 +163,7 @@ def body_modes(space: Space, body: RigidBody) -> tuple[np.ndarray, np.ndarray]:
 def _follow(
     space: Space, body: RigidBody, moved: Mapping[int, float], absent: np.ndarray, motion: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """The tied dofs of a body that are not held and how they follow its free motions; its other motion goes to `motion`.
+    """The tied dofs of a body that are not held and how they follow its free motions; the rest goes to `motion`.
 
     Dofs that the body cannot move at all count as tied, to nothing.
     """

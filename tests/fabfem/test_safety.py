@@ -78,7 +78,8 @@ def test_the_bracket_holds_the_exact_factor(material: Any) -> None:
     assert end.first_failure - end.last_equilibrium <= 0.0020001
     assert steps[-1].strength == end.last_equilibrium
     assert [factor.verdict for factor in end.tried].count("equilibrium") == sum(s.stage == "search" for s in steps)
-    assert end.failing is not None and end.failing.strength == end.first_failure
+    assert end.failing is not None
+    assert end.failing.strength == end.first_failure
     assert np.abs(end.failing.step).max() > 0.0
 
 
@@ -95,8 +96,10 @@ def test_an_iteration_that_gives_up_is_no_failure() -> None:
     """With three iterations Newton's method refuses increments that the flow then brings to rest."""
     material = MATERIALS["Mohr-Coulomb"]
     _, sure = search(material)
-    steps, end = search(material, Controls(max_iterations=3))
-    assert (end.last_equilibrium, end.first_failure) == pytest.approx((sure.last_equilibrium, sure.first_failure), abs=0.011)
+    _, end = search(material, Controls(max_iterations=3))
+    assert (end.last_equilibrium, end.first_failure) == pytest.approx(
+        (sure.last_equilibrium, sure.first_failure), abs=0.011
+    )
     assert end.verdict == "collapse"
 
 
@@ -121,9 +124,13 @@ def test_what_is_divided(factor: float) -> None:
     joint = weakened(MohrCoulomb(1.0, 0.2, 3.0, 30.0, 30.0), factor)
     assert joint.dilation_angle == joint.friction_angle
     cone = weakened(DruckerPrager(1.0, 0.2, 1.2, 0.9, 5.0, 7.0), factor)
-    assert (cone.friction_slope, cone.strength, cone.hardening_modulus) == pytest.approx((1.2 / factor, 5 / factor, 7 / factor))
+    assert (cone.friction_slope, cone.strength, cone.hardening_modulus) == pytest.approx(
+        (1.2 / factor, 5 / factor, 7 / factor)
+    )
     assert cone.dilation_slope == pytest.approx(min(0.9, 1.2 / factor))
-    assert weakened(VonMises(1.0, 0.2, 3.0, 4.0, 1.0), factor)[2:] == pytest.approx((3 / factor, 4 / factor, 1 / factor))
+    assert weakened(VonMises(1.0, 0.2, 3.0, 4.0, 1.0), factor)[2:] == pytest.approx(
+        (3 / factor, 4 / factor, 1 / factor)
+    )
     assert weakened(Elastic(1.0, 0.2), factor) == Elastic(1.0, 0.2)
     sand = ChangHicher(0.9, 0.02, 0.7, 1.0, 30.0, 0.5, 0.5, 1.0, 1.0)
     weak = weakened(sand, factor)
