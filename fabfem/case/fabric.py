@@ -38,7 +38,7 @@ class Law(Table):
 
 
 class Start(Table):
-    """The fabric at the start; without this table that of the path's material, or of the sample, or none."""
+    """The fabric at the start; without this table that of the material, or of the sample, or none."""
 
     norm: NotNegative = 0.0
     """Size of the fabric anisotropy tensor (F) of a deposit, large along the deposition axis z."""
@@ -72,7 +72,7 @@ class Leg(Table):
     """Records of the leg."""
 
 
-class Path(Table):
+class Loading(Table):
     """A path that the case's Chang-Hicher material computes; one for each pair of b and alpha."""
 
     pressure: Positive
@@ -141,7 +141,7 @@ class Picture(Table):
     """Same scale across and upwards."""
 
 
-DRIVES = ("history", "path", "probe", "surface", "contacts")
+DRIVES = ("history", "loading", "probe", "surface", "contacts")
 
 
 class FabricCase(Case):
@@ -157,7 +157,7 @@ class FabricCase(Case):
     """Fabric at the start."""
     history: History | None = None
     """A history from a file."""
-    path: Path | None = None
+    loading: Loading | None = None
     """A path of the Chang-Hicher model."""
     probe: Probe | None = None
     """Strain probes."""
@@ -181,28 +181,30 @@ def contradictions(case: FabricCase) -> Iterator[tuple[str, str]]:
         yield "the file", f"needs exactly one of {', '.join(f'[{name}]' for name in DRIVES)} (got {len(given)})"
     if case.contacts is None and not case.law:
         yield "law", "is missing; a case needs at least one [law.NAME]"
-    yield from _path(case)
+    yield from _loading(case)
     for picture in case.picture:
         for name in (name for panel in picture.panels for name in panel if name not in case.law):
             yield f"picture[{picture.name}].panels", f"there is no law '{name}'{suggest(name, case.law)}"
 
 
-def _path(case: FabricCase) -> Iterator[tuple[str, str]]:
-    if case.path is None:
+def _loading(case: FabricCase) -> Iterator[tuple[str, str]]:
+    if case.loading is None:
         if case.material:
-            yield "material", "is only for a [path]; here nothing would use it"
+            yield "material", "is only for a [loading]; here nothing would use it"
         return
     if len(case.material) != 1 or not isinstance(next(iter(case.material.values())), ChangHicher):
-        yield "material", "a [path] needs exactly one material, of model 'chang_hicher'"
+        yield "material", "[loading] needs exactly one material, of model 'chang_hicher'"
     elif (material := next(iter(case.material.values()))).localisation != "total":  # type: ignore[union-attr]
         yield (
             f"material.{next(iter(case.material))}.localisation",
             "must be 'total', where the plastic strain of a path follows from its records "
             f"(got {material.localisation!r})",  # type: ignore[union-attr]
         )
-    for number, leg in enumerate(case.path.leg, 1):
+    for number, leg in enumerate(case.loading.leg, 1):
         wanted, other = ("pressure", "strain") if leg.kind == "isotropic" else ("strain", "pressure")
         if getattr(leg, wanted) is None:
-            yield f"path.leg[{number}].{wanted}", f"is missing; a leg of kind '{leg.kind}' needs it"
+            yield f"loading.leg[{number}].{wanted}", f"is missing; a leg of kind '{leg.kind}' needs it"
+        if leg.kind == "triaxial" and any(case.loading.b + case.loading.alpha):
+            yield f"loading.leg[{number}].kind", "'triaxial' is along z with b = 0; use 'constant_p' with b and alpha"
         if getattr(leg, other) is not None:
-            yield f"path.leg[{number}].{other}", f"means nothing to a leg of kind '{leg.kind}'"
+            yield f"loading.leg[{number}].{other}", f"means nothing to a leg of kind '{leg.kind}'"
