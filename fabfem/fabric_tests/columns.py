@@ -50,8 +50,9 @@ def drive_columns(given: Given) -> list[Array]:
 def fabric_columns(fabric: Array, stress: Array, planar: bool) -> list[Array]:
     """Return the columns of a fabric (..., 6) under a stress; NaN where one has no meaning.
 
-    Components of the tensor; ‖F‖; F_q = √(3/2) ‖F‖ [Y 2.2] and F_b = (F_2 − F_3)/(F_1 − F_3) of its deviator; F_n = F:s/‖s‖;
-    the angle between the major axes of F and of the stress; of a law in the plane Z = tr F and A = F_1 − F_2 [P 5].
+    Components of the tensor; ‖F‖; F_q = √(3/2) ‖F‖ [Y 2.2], F_b = (F_2 − F_3)/(F_1 − F_3), F_n = F:s/‖s‖; the angle
+    between the major axes of F and of the stress; of a law in the plane, instead of F_q, F_b and F_n, Z = tr F and
+    A = F_1 − F_2 [P 5].
     """
     f, s = deviator(fabric), deviator(stress)
     empty = np.full(fabric.shape[:-1], np.nan)
@@ -59,9 +60,10 @@ def fabric_columns(fabric: Array, stress: Array, planar: bool) -> list[Array]:
         along = np.where(norm(s) > NONE * np.abs(trace(stress)), dot(f, s) / norm(s), np.nan)
         major, middle, minor = np.moveaxis(principal(f), -1, 0)
         b = np.where(norm(f) > NONE, (middle - minor) / (major - minor), np.nan)
-    plane = [trace(fabric), anisotropy(fabric)] if planar else [empty, empty]
-    size = norm(f) if not planar else norm(fabric)
-    return [*np.moveaxis(fabric / FACTOR, -1, 0), size, np.sqrt(1.5) * norm(f), b, along, angle(f, s), *plane]
+    components = [*np.moveaxis(fabric / FACTOR, -1, 0), norm(fabric)]
+    if planar:
+        return [*components, empty, empty, empty, angle(f, s), trace(fabric), anisotropy(fabric)]
+    return [*components, np.sqrt(1.5) * norm(f), b, along, angle(f, s), empty, empty]
 
 
 def angle(first: Array, second: Array) -> Array:

@@ -33,7 +33,9 @@ def measure(drive: said.Contacts, case: FabricCase) -> Measured:
         normals = _read(drive, case) if drive.file else _drawn(drive, case)
     stress = None if drive.stress is None else to_tensor(np.array(drive.stress) * FACTOR)
     unit = case.unit_system.label("stress")
-    joint = tuple(f"{name} [{unit}{'2' * (place > 1)}]" for place, name in enumerate(JOINT)) if stress is not None else ()
+    joint = (
+        tuple(f"{name} [{unit}{'2' * (place > 1)}]" for place, name in enumerate(JOINT)) if stress is not None else ()
+    )
     headers = (PLANE if normals.shape[1] == 2 else SPACE) + joint
     return Measured(headers, _blocks(normals, stress), (("contacts", str(len(normals))),))
 

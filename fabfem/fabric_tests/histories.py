@@ -121,7 +121,9 @@ def _read(case: FabricCase, drive: said.History) -> tuple[dict[str, Array], list
     if len(lines) < 3:
         raise ValueError(f"{drive.file} needs a header and two records at least")
     headers = [header.split("[")[0].strip() for header in lines[0]]
-    wanted = {name: name for name in ("path", "state_parameter", *(f"{k}_{a}" for k in list(NUMBERS)[:3] for a in AXES))}
+    wanted = {
+        name: name for name in ("path", "state_parameter", *(f"{k}_{a}" for k in list(NUMBERS)[:3] for a in AXES))
+    }
     for name, other in drive.columns.items():
         _rename(case, wanted, headers, name, other)
     at = {name: headers.index(other) for name, other in wanted.items() if other in headers}
@@ -135,7 +137,9 @@ def _rename(case: FabricCase, wanted: dict[str, str], headers: list[str], name: 
     if name not in wanted:
         raise CaseError(f"{case.path.name}: history.columns.{name}: is no column of a history{suggest(name, wanted)}")
     if other not in headers:
-        raise CaseError(f"{case.path.name}: history.columns.{name}: the file has no column '{other}'{suggest(other, headers)}")
+        raise CaseError(
+            f"{case.path.name}: history.columns.{name}: the file has no column '{other}'{suggest(other, headers)}"
+        )
     wanted[name] = other
 
 
@@ -146,7 +150,9 @@ def _numbers(drive: said.History, lines: list[list[str]], place: int) -> Iterato
             value = float(line[place])
         except (ValueError, IndexError):
             got = line[place] if place < len(line) else "nothing"
-            raise ValueError(f"{drive.file}, line {number}, column '{lines[0][place]}': not a number ({got!r})") from None
+            raise ValueError(
+                f"{drive.file}, line {number}, column '{lines[0][place]}': not a number ({got!r})"
+            ) from None
         if not np.isfinite(value):
             raise ValueError(f"{drive.file}, line {number}, column '{lines[0][place]}': not finite ({value})")
         found.append(value)
@@ -196,9 +202,7 @@ def _(drive: said.Loading, case: FabricCase, laws: tuple[Curve, ...]) -> tuple[G
         stress = np.tile(drive.pressure * IDENTITY, (len(variants), 1))
         state = umat.initial_state(sand.material, sand.directions, stress, **sand.needs)
     seen = _follow(drive, sand, state, variants)
-    plastic = plastic_strain(
-        sand.material, sand.directions, seen.stress, seen.strain, seen.fabric, seen.void_ratio
-    )
+    plastic = plastic_strain(sand.material, sand.directions, seen.stress, seen.strain, seen.fabric, seen.void_ratio)
     psi = seen.void_ratio - critical_void_ratio(sand.material, p(seen.stress))
     labels = [(f"b={b:g} alpha={alpha:g}", b, alpha) for b, alpha in variants]
     records = np.isfinite(seen.stress[..., 0]).sum(axis=0)
@@ -206,7 +210,9 @@ def _(drive: said.Loading, case: FabricCase, laws: tuple[Curve, ...]) -> tuple[G
     for count in np.unique(records)[::-1]:
         mine = np.flatnonzero(records == count)
         parts = [array[:count, mine] for array in (seen.stress, seen.strain, plastic, psi)]
-        why = "" if count == len(psi) else f"the material stopped after {count - 1} of {len(psi) - 1} records of the path"
+        why = (
+            "" if count == len(psi) else f"the material stopped after {count - 1} of {len(psi) - 1} records of the path"
+        )
         groups.append(Group(tuple(labels[i] for i in mine), Given(*parts), seen.fabric[:count, mine], reason=why))
     return tuple(groups)
 
@@ -220,13 +226,18 @@ def _follow(drive: said.Loading, sand: Any, state: Any, variants: list[tuple[flo
         conditions = paths.Leg(*(np.array(part) for part in zip(*each, strict=True)))
         done = paths.follow(sand.material, sand.directions, state, conditions, records=leg.records)
         shift = 0 if not kept else 1
-        arrays = [np.array(array[shift:]) for array in (done.stress, done.strain + strain, done.void_ratio, done.fabric)]
+        arrays = [
+            np.array(array[shift:]) for array in (done.stress, done.strain + strain, done.void_ratio, done.fabric)
+        ]
         for array in arrays:
             array[:, ~alive] = np.nan
         kept.append(done._replace(**dict(zip(("stress", "strain", "void_ratio", "fabric"), arrays, strict=True))))
         alive &= done.reached >= 1.0
         strain, state = np.nan_to_num(strain + done.strain[-1]), done.state
-    joined = {name: np.concatenate([getattr(one, name) for one in kept]) for name in ("stress", "strain", "void_ratio", "fabric")}
+    joined = {
+        name: np.concatenate([getattr(one, name) for one in kept])
+        for name in ("stress", "strain", "void_ratio", "fabric")
+    }
     return kept[-1]._replace(**joined)
 
 

@@ -20,7 +20,7 @@ from umat.fabric_history import PLASTIC, PSI, RATIO, STRAIN, STRESS, increment
 from umat.mandel import FACTOR, Array, deviator, dot, norm
 
 HEADERS = (
-    "law", "chi [degree]", "theta [degree]", "strain_xx [-]", "strain_yy [-]", "strain_xy [-]",
+    "law", "path", "chi [degree]", "theta [degree]", "strain_xx [-]", "strain_yy [-]", "strain_xy [-]",
     *(f"dF_{axes} [-]" for axes in AXES), "dZ [-]", "dA [-]",
 )  # fmt: skip
 
@@ -64,9 +64,13 @@ def _blocks(drive: said.Probe, case: FabricCase, laws: tuple[Curve, ...]) -> Ite
         # A = F_1 − F_2 grows by the change along the major axis less that along the minor, √2 ΔF:τ̂
         dz, da = change[:, :3].sum(axis=1), 2.0**0.5 * dot(change, _major(fabric, stress))
         columns = [chi, theta, *(strain / FACTOR)[:, [0, 1, 5]].T, *(change / FACTOR).T, dz, da]
-        found = [(curve.name, *(float(value) for value in row)) for row in zip(*columns, strict=True)]
+        found = [
+            (curve.name, f"theta={row[1]:g}", *(float(value) for value in row)) for row in zip(*columns, strict=True)
+        ]
         summary = {"law": curve.name, "asymmetry_on_reversal": _relative(change + back, change)}
-        yield Block(found, summary | {"distance_from_first": _relative(change - full, full)} | _plane(chi, theta, dz, da))
+        yield Block(
+            found, summary | {"distance_from_first": _relative(change - full, full)} | _plane(chi, theta, dz, da)
+        )
 
 
 def _major(fabric: Array, stress: Array) -> Array:

@@ -6,7 +6,7 @@ from typing import Any
 
 from fabfem.case import FabricCase
 from fabfem.case import fabric as said
-from fabfem.fabric_tests.drives import Measured, Value
+from fabfem.fabric_tests.drives import Measured
 from fabfem.outcome import Description, Outcome, make_folder, short
 from fabfem.output.history import History
 from fabfem.output.interrupt import held_back

@@ -32,6 +32,13 @@ def _blocks(drive: said.Surface, laws: tuple[Curve, ...]) -> Iterator[Block]:
         columns = (lode, b, ratio, fabric, ratio / ratio[0], fabric / fabric[0], ratio * fabric)
         rows = [(curve.name, *(float(value) for value in row)) for row in zip(*columns, strict=True)]
         product = ratio * fabric
-        ends = {"M_compression": ratio[0], "M_extension": ratio[-1], "F_compression": fabric[0], "F_extension": fabric[-1]}
+        ends = {
+            "M_compression": ratio[0],
+            "M_extension": ratio[-1],
+            "F_compression": fabric[0],
+            "F_extension": fabric[-1],
+        }
         spread = float((product.max() - product.min()) / product.mean())
-        yield Block(rows, {"law": curve.name} | {name: float(x) for name, x in ends.items()} | {"spread_of_M_F": spread})
+        yield Block(
+            rows, {"law": curve.name} | {name: float(x) for name, x in ends.items()} | {"spread_of_M_F": spread}
+        )

@@ -70,7 +70,7 @@ def _picture(folder: Path, picture: Any, curves: Any, headers: dict[str, str], t
             raise CaseError(f"{folder.name}: {where}: the history has no column '{name}'{suggest(name, headers)}")
     laws = list(dict.fromkeys(law for law, _ in curves))
     panels = [tuple(panel) for panel in picture.get("panels") or ()] or [(law,) for law in laws]
-    across = min(len(panels), MANY)
+    across = min(len(panels), MANY) if len(panels) != MANY + 1 else 2
     down = -(-len(panels) // across)
     figure = Figure(figsize=(1.2 + 3.6 * across, 0.9 + 3.2 * down), layout="constrained")
     polar = {"projection": "polar"} if picture.get("polar") else {}
@@ -79,8 +79,9 @@ def _picture(folder: Path, picture: Any, curves: Any, headers: dict[str, str], t
     colours = dict(zip(paths, colormaps["viridis"](np.linspace(0.0, 0.88, len(paths))), strict=True))
     for panel, ax in zip(panels, axes.flat, strict=False):
         _panel(ax, panel, picture, curves, colours, headers)
-    for ax in axes.flat[len(panels) :]:
-        ax.set_axis_off()
+    for number, ax in enumerate(axes.flat):
+        ax.tick_params(labelbottom=True)
+        ax.set_visible(number < len(panels))
     _key(figure, paths, colours)
     figure.suptitle(title, fontsize=9)
     FigureCanvasAgg(figure)
@@ -105,11 +106,14 @@ def _panel(ax: Axes, panel: tuple[str, ...], picture: Any, curves: Any, colours:
     if picture.get("polar"):
         ax.tick_params(labelsize=7)
     else:
-        ax.set(xlabel=_label(headers[picture["x"]]), ylabel=_label(headers[picture["y"]]))
+        ax.set_xlabel(_label(headers[picture["x"]]))
+        ax.set_ylabel(_label(headers[picture["y"]]) if ax.get_subplotspec().is_first_col() else "")
         ax.spines[["top", "right"]].set_visible(False)
         ax.set_aspect("equal" if picture.get("equal") else "auto")
     if len(panel) > 1:
-        lines = [Line2D([], [], color="#444444", linestyle=style) for _, style in zip(panel, cycle(STYLES), strict=False)]
+        lines = [
+            Line2D([], [], color="#444444", linestyle=style) for _, style in zip(panel, cycle(STYLES), strict=False)
+        ]
         ax.legend(lines, panel, fontsize=7, frameon=False, loc="best")
 
 
