@@ -24,7 +24,8 @@ from umat.mandel import FACTOR, Array, norm, to_tensor
 
 PLANE = ("contacts", "F_11 [-]", "F_22 [-]", "F_12 [-]", "Delta [-]", "Delta_error [-]", "phi [degree]", "A [-]")
 SPACE = ("contacts", *(f"F_{axes} [-]" for axes in AXES), *(f"error_{axes} [-]" for axes in AXES), "F_norm [-]")
-JOINT = ("L1", "L2", "L3", "L4")
+JOINT = {"L1": "", "L2": "", "L3": "2", "L4": "2"}
+"""Joint invariants and the power of stress in them."""
 
 
 def measure(drive: said.Contacts, case: FabricCase) -> Measured:

@@ -14,7 +14,7 @@ from fabfem.case import FabricCase
 from fabfem.case import fabric as said
 from fabfem.fabric_tests.columns import AXES
 from fabfem.fabric_tests.curves import Curve, curves, start
-from fabfem.fabric_tests.drives import Block, Measured
+from fabfem.fabric_tests.drives import Block, Measured, Value
 from umat.fabric.law import INPUTS
 from umat.fabric_history import PLASTIC, PSI, RATIO, STRAIN, STRESS, increment
 from umat.mandel import FACTOR, Array, deviator, dot, norm
@@ -64,10 +64,10 @@ def _blocks(drive: said.Probe, case: FabricCase, laws: tuple[Curve, ...]) -> Ite
         # A = F_1 − F_2 grows by the change along the major axis less that along the minor, √2 ΔF:τ̂
         dz, da = change[:, :3].sum(axis=1), 2.0**0.5 * dot(change, _major(fabric, stress))
         columns = [chi, theta, *(strain / FACTOR)[:, [0, 1, 5]].T, *(change / FACTOR).T, dz, da]
-        found = [
+        found: list[tuple[Value, ...]] = [
             (curve.name, f"theta={row[1]:g}", *(float(value) for value in row)) for row in zip(*columns, strict=True)
         ]
-        summary = {"law": curve.name, "asymmetry_on_reversal": _relative(change + back, change)}
+        summary: dict[str, Any] = {"law": curve.name, "asymmetry_on_reversal": _relative(change + back, change)}
         yield Block(
             found, summary | {"distance_from_first": _relative(change - full, full)} | _plane(chi, theta, dz, da)
         )
@@ -94,7 +94,7 @@ def _plane(chi: Array, theta: Array, dz: Array, da: Array) -> dict[str, float]:
     flat = theta == 90.0
     angle = np.radians(chi[flat][:-1])
     waves = np.stack([np.cos(angle), np.sin(angle)], axis=1)
-    found = {}
+    found: dict[str, float] = {}
     for name, values in (("Z", dz[flat][:-1]), ("A", da[flat][:-1])):
         (a, b), *_ = np.linalg.lstsq(waves, values, rcond=None)
         found |= {f"a_{name}": float(a), f"b_{name}": float(b)}

@@ -6,7 +6,7 @@ from typing import Any
 
 from fabfem.case import FabricCase
 from fabfem.case import fabric as said
-from fabfem.fabric_tests.drives import Measured
+from fabfem.fabric_tests.drives import Measured, Value
 from fabfem.outcome import Description, Outcome, make_folder, short
 from fabfem.output.history import History
 from fabfem.output.interrupt import held_back
@@ -66,8 +66,9 @@ def run(case: FabricCase, folder: Path, quiet: bool, timer: Timer | None = None)
         file.unlink(missing_ok=True)
     history = History(folder / "history.csv", measured.headers)
     report = Report(folder / "report.json", **_head(case, measured))
-    count, last = 0, ()  # type: tuple[int, tuple[Value, ...]]
-    status, reasons = "completed", []
+    count, status = 0, "completed"
+    last: tuple[Value, ...] = ()
+    reasons: list[str] = []
     try:
         for block in measured.blocks:
             with held_back():

@@ -7,7 +7,7 @@ import numpy as np
 from fabfem.case import FabricCase
 from fabfem.case import fabric as said
 from fabfem.fabric_tests.curves import Curve, curves
-from fabfem.fabric_tests.drives import Block, Measured, blamed
+from fabfem.fabric_tests.drives import Block, Measured, Value, blamed
 from umat.fabric.critical import critical_state
 
 HEADERS = ("law", "lode [degree]", "b [-]", "M [-]", "F_qc [-]", "M/M_c [-]", "F_qc/F_qcc [-]", "M F_qc [-]")
@@ -30,15 +30,16 @@ def _blocks(drive: said.Surface, laws: tuple[Curve, ...]) -> Iterator[Block]:
     for curve in laws:
         ratio, fabric = critical_state(curve.law, lode)
         columns = (lode, b, ratio, fabric, ratio / ratio[0], fabric / fabric[0], ratio * fabric)
-        rows = [(curve.name, *(float(value) for value in row)) for row in zip(*columns, strict=True)]
+        rows: list[tuple[Value, ...]] = [
+            (curve.name, *(float(value) for value in row)) for row in zip(*columns, strict=True)
+        ]
         product = ratio * fabric
-        ends = {
-            "M_compression": ratio[0],
-            "M_extension": ratio[-1],
-            "F_compression": fabric[0],
-            "F_extension": fabric[-1],
+        summary = {
+            "law": curve.name,
+            "M_compression": float(ratio[0]),
+            "M_extension": float(ratio[-1]),
+            "F_compression": float(fabric[0]),
+            "F_extension": float(fabric[-1]),
+            "spread_of_M_F": float((product.max() - product.min()) / product.mean()),
         }
-        spread = float((product.max() - product.min()) / product.mean())
-        yield Block(
-            rows, {"law": curve.name} | {name: float(x) for name, x in ends.items()} | {"spread_of_M_F": spread}
-        )
+        yield Block(rows, summary)

@@ -107,7 +107,7 @@ def _panel(ax: Axes, panel: tuple[str, ...], picture: Any, curves: Any, colours:
         ax.tick_params(labelsize=7)
     else:
         ax.set_xlabel(_label(headers[picture["x"]]))
-        ax.set_ylabel(_label(headers[picture["y"]]) if ax.get_subplotspec().is_first_col() else "")
+        ax.set_ylabel(_label(headers[picture["y"]]))
         ax.spines[["top", "right"]].set_visible(False)
         ax.set_aspect("equal" if picture.get("equal") else "auto")
     if len(panel) > 1:

@@ -135,8 +135,9 @@ def probe_increment(parameters: Array, stress: Array, strain: Array) -> Array:
 
 def parameters_at(anisotropy: ArrayLike) -> Array:
     """Return d1, d2, d3, d4, d_ρ (n, 5) at anisotropies A (n,), between the samples [P Fig 7]."""
-    known = [one.anisotropy for one in SAMPLES]
-    return np.stack([np.interp(anisotropy, known, column) for column in zip(*(s.law for s in SAMPLES), strict=True)], 1)
+    at, known = np.asarray(anisotropy, float), np.array([one.anisotropy for one in SAMPLES])
+    table = np.array([one.law for one in SAMPLES])
+    return np.stack([np.interp(at, known, column) for column in table.T], axis=1)
 
 
 def anisotropy(fabric: ArrayLike) -> Array:
