@@ -55,6 +55,8 @@ class History(Table):
     """CSV file with a header; relative to the case file."""
     columns: dict[str, str] = Field(default={})
     """Name in the file of a column that is called otherwise there; see docs/fabric_laws.md for the names."""
+    stage: Text | None = None
+    """Stage to take, of a file with a column ``stage``, such as the history of an element test."""
     plastic: Literal["given", "total"] = "given"
     """Plastic strain from its own columns, or the total strain in its place, as [Y 8.2] does."""
 

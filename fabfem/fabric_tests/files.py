@@ -41,15 +41,39 @@ def _read(case: FabricCase, drive: said.History) -> tuple[dict[str, Array], list
     if len(lines) < 3:
         raise ValueError(f"{drive.file} needs a header and two records at least")
     headers = [header.split("[")[0].strip() for header in lines[0]]
+    for number, line in enumerate(lines, 1):
+        if len(line) != len(headers):
+            raise ValueError(f"{drive.file}, row {number}: has {len(line)} entries where the header has {len(headers)}")
     wanted = {
         name: name for name in ("path", "state_parameter", *(f"{k}_{a}" for k in list(NUMBERS)[:3] for a in AXES))
     }
+    if "psi" in headers and "state_parameter" not in headers:
+        wanted["state_parameter"] = "psi"  # as element tests call it
+    lines[1:] = _of_stage(drive, lines[1:], headers)
     for name, other in drive.columns.items():
         _rename(case, wanted, headers, name, other)
     at = {name: headers.index(other) for name, other in wanted.items() if other in headers}
     names = [line[at["path"]] for line in lines[1:]] if "path" in at else ["history"] * (len(lines) - 1)
     numbers = {name: np.array(_numbers(drive, lines, place)) for name, place in at.items() if name != "path"}
     return numbers, names
+
+
+def _of_stage(drive: said.History, lines: list[list[str]], headers: list[str]) -> list[list[str]]:
+    """Return the rows of the stage that is asked for; strains of element tests begin anew in each."""
+    if "stage" not in headers:
+        if drive.stage is not None:
+            raise ValueError(f"{drive.file} has no column 'stage'")
+        return lines
+    place = headers.index("stage")
+    stages = list(dict.fromkeys(line[place] for line in lines))
+    if drive.stage is None and len(stages) > 1:
+        raise ValueError(f"{drive.file} has the stages {', '.join(stages)}; history.stage must say which")
+    kept = [line for line in lines if line[place] == (drive.stage or stages[0])]
+    if len(kept) < 2:
+        raise ValueError(
+            f"{drive.file} has no stage '{drive.stage}' of two records at least; there are {', '.join(stages)}"
+        )
+    return kept
 
 
 def _rename(case: FabricCase, wanted: dict[str, str], headers: list[str], name: str, other: str) -> None:
@@ -67,13 +91,11 @@ def _numbers(drive: said.History, lines: list[list[str]], place: int) -> list[fl
     for number, line in enumerate(lines[1:], 2):
         try:
             value = float(line[place])
-        except (ValueError, IndexError):
-            got = line[place] if place < len(line) else "nothing"
-            raise ValueError(
-                f"{drive.file}, line {number}, column '{lines[0][place]}': not a number ({got!r})"
-            ) from None
+        except ValueError:
+            what = f"no number ({line[place]!r})"
+            raise ValueError(f"{drive.file}, row {number}, column '{lines[0][place]}': {what}") from None
         if not np.isfinite(value):
-            raise ValueError(f"{drive.file}, line {number}, column '{lines[0][place]}': not finite ({value})")
+            raise ValueError(f"{drive.file}, row {number}, column '{lines[0][place]}': not finite ({value})")
         found.append(value)
     return found
 

@@ -43,6 +43,8 @@ def measure(drive: said.History | said.Loading, case: FabricCase) -> Measured:
     """Return the table of all laws along all histories."""
     laws = curves(case)
     groups = histories(drive, case, laws)
+    for curve, group in product(laws, groups):  # what cannot start is said before anything is written
+        start(case, curve, group.given.stress[0], None if group.fabric is None else group.fabric[0])
     size = sum(len(group.labels) for group in groups)
     records = sum(len(group.labels) * len(group.given.stress) for group in groups)
     remains = (("laws", str(len(laws))), ("histories", str(size)), ("records", str(records)))

@@ -28,8 +28,10 @@ HEADERS = (
 def measure(drive: said.Probe, case: FabricCase) -> Measured:
     """Return the table of all laws under all probes."""
     laws = curves(case)
+    stress = np.array(drive.stress) * FACTOR
+    starts = [start(case, curve, stress[None])[0] for curve in laws]
     count = drive.directions * drive.inclinations
-    return Measured(HEADERS, _blocks(drive, case, laws), (("laws", str(len(laws))), ("probes", str(count))))
+    return Measured(HEADERS, _blocks(drive, stress, laws, starts), (("laws", str(len(laws))), ("probes", str(count))))
 
 
 def probes(directions: int, inclinations: int) -> tuple[Array, Array, Array]:
@@ -52,12 +54,10 @@ def rates(law: Any, fabric: Array, stress: Array, psi: float, strain: Array) -> 
     return increment(law, inputs)
 
 
-def _blocks(drive: said.Probe, case: FabricCase, laws: tuple[Curve, ...]) -> Iterator[Block]:
-    stress = np.array(drive.stress) * FACTOR
+def _blocks(drive: said.Probe, stress: Array, laws: tuple[Curve, ...], starts: list[Array]) -> Iterator[Block]:
     chi, theta, strain = probes(drive.directions, drive.inclinations)
     full: Array | None = None
-    for curve in laws:
-        fabric = start(case, curve, stress[None])[0]
+    for curve, fabric in zip(laws, starts, strict=True):
         change = rates(curve.law, fabric, stress, drive.state_parameter, strain)
         back = rates(curve.law, fabric, stress, drive.state_parameter, -strain)
         full = change if full is None else full
