@@ -85,7 +85,7 @@ def test_explicit_update_is_exact_where_a_solution_is_known(law, expected):
 
 
 def test_petalas_is_the_quadrature_of_its_own_rate():
-    """X' = c e^(x/F_c) (F_c − x): the length of shear between two fabrics is the integral of 1/x'."""
+    """Along n, x' = c e^(x/F_c) (F_c − x): the length of shear between two fabrics is the integral of 1/x'."""
     from scipy.integrate import quad
 
     law = Petalas(rate=2.0, critical_fabric=0.5)
