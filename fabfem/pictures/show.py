@@ -9,6 +9,7 @@ import os
 import subprocess
 import sys
 from collections.abc import Sequence
+from importlib import import_module
 from pathlib import Path
 from typing import NamedTuple
 
@@ -17,6 +18,9 @@ from fabfem.output.history import read_history
 
 DRAW = (sys.executable, "-m", "fabfem.pictures.draw")
 """Command that draws the fields of the folder it is given."""
+
+DRAWERS = {"fabric": "fabfem.pictures.curves"}
+"""Module that draws the pictures of a kind of scene which is no boundary-value problem; it has `draw(folder)`."""
 
 TIME_LIMIT = 600.0
 """Longest time that drawing the fields may take [s]."""
@@ -51,6 +55,9 @@ def show(folder: Path) -> Shown:
     """
     if not (folder / "history.csv").is_file():
         raise CaseError(f"{folder}: holds no result (there is no history.csv)")
+    drawer = DRAWERS.get(str(_report(folder).get("kind")))
+    if drawer:
+        return Shown(tuple(import_module(drawer).draw(folder)), "")
     pictures = [*_curve(folder)]
     before = {picture.name: picture.stat().st_mtime_ns for picture in folder.glob("*.png")}
     trouble = _draw_fields(folder) if (folder / "fields_0000.vtu").is_file() else ""
