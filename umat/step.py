@@ -61,6 +61,7 @@ class Found(NamedTuple):
     """(n,) evaluations of the material."""
 
 
+@np.errstate(all="ignore")  # a trial far off is found not to be finite, and shortened
 def solve(
     material: Any, directions: Any, old: Any, strain: Array, tangent: Array, task: Task, tolerance: float, most: int
 ) -> Found:

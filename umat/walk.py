@@ -77,8 +77,17 @@ class Walk:
 
     def moment(self) -> Moment:
         """Return where the points are now."""
-        copies = (self.ended, self.led, self.code, self.steps, self.work, self.error)
-        return Moment(self.reached.copy(), self.strain.copy(), self.state, *(array.copy() for array in copies))
+        return Moment(
+            self.reached.copy(),
+            self.strain.copy(),
+            self.state,
+            self.ended.copy(),
+            self.led.copy(),
+            self.code.copy(),
+            self.steps.copy(),
+            self.work.copy(),
+            self.error.copy(),
+        )
 
 
 class Way(NamedTuple):
