@@ -203,7 +203,7 @@ def _end(way: Way, walk: Walk, ids: NDArray[np.intp]) -> None:
     far = walk.led[ids] & ((sheared >= way.controls.beyond) | (walk.reached[ids] <= 0.0))
     walk.ended[ids[far]] = BEYOND
     walk.ended[ids[walk.reached[ids] >= 1.0]] = DONE
-    if way.watch is not None:
+    if way.watch is not None and ids.size:
         walk.ended[ids[way.watch(of(walk.state, ids))]] = WATCHED
 
 
