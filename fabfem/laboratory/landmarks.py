@@ -1,6 +1,6 @@
 """States of a test that have names: instability, phase transformation, characteristic, peak and critical state.
 
-Found among the rows of a stage, each at the vertex of the parabola through the three rows around an extremum, over the
+Found among the rows of a stage, up to its first reversal, each at the vertex of the parabola through the three rows around an extremum, over the
 path length of strain; whatever else is said of the state is interpolated between the rows on either side. An extremum
 counts where the curve comes back from it by more than `NOTICED` of its largest value in the stage.
 
@@ -112,7 +112,7 @@ def _peak(rows: Rows) -> float | None:
     ratio = eta(rows.stress)
     top = int(np.nanargmax(np.where(np.isfinite(ratio), ratio, -1.0)))
     after = ratio[top:]
-    falls = top > 0 and float(ratio[top] - np.nanmin(after)) > NOTICED * ratio[top]
+    falls = top > 0 and ratio[top] > NOTICED and float(ratio[top] - np.nanmin(after)) > NOTICED * ratio[top]
     return vertex(ratio, rows.way, top) if falls else None
 
 

@@ -37,6 +37,7 @@ class Recorder:
         self.values: tuple[Any, ...] = ()
         self.count = 0
         self._rows: list[Row] = []
+        self._first = 0
 
     def add(self, point: Point) -> None:
         """Write a row."""
@@ -46,6 +47,7 @@ class Recorder:
             self.values = (point.stage, point.increment, point.fraction, *measured)
             self.history.write(self.values)
             self._rows.append(row)
+            self._first += point.leg == 0
             self.count += point.increment > 0
             if self.roses:
                 strain = float(measures.deviatoric_strain(point.strain))
@@ -59,7 +61,7 @@ class Recorder:
 
     def end_path(self, stage: Path, end: End) -> None:
         """Say in the report how a path ended and which states it passed."""
-        rows = _gathered(self._rows, end.status != "liquefied")
+        rows = _gathered(self._rows[: self._first], end.status != "liquefied")
         places = landmarks(rows)
         self.report.content["stages"].append(
             {
@@ -70,7 +72,7 @@ class Recorder:
                 "states": {name: self._described(rows, place) for name, place in places.items()},
             }
         )
-        self._rows = []
+        self._rows, self._first = [], 0
         self._write()
 
     def _described(self, rows: Rows, place: float) -> dict[str, Any]:

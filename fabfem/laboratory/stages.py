@@ -32,6 +32,8 @@ class Point(NamedTuple):
     """(6,) strain of the stage."""
     state: Any
     """State of the material, of one point."""
+    leg: int
+    """Number of the leg, from 0; a stage without reversals has one."""
 
 
 class End(NamedTuple):
@@ -55,7 +57,7 @@ def path(specimen: Specimen, stage: Path, state: Any, strain: Array) -> Iterator
     watch = _liquefies(specimen.atmosphere * stage.liquefied, state)
     origin, start, row, error = state.stress[0], strain, 0, 0.0
     steps = work = 0
-    yield Point(stage.name, 0, 0.0, strain, state)
+    yield Point(stage.name, 0, 0.0, strain, state, 0)
     for number, target in enumerate(todo.targets):
         done = todo.on_stress @ (state.stress[0] - origin) + todo.on_strain @ (strain - start)
         leg, base, seen = Leg(todo.on_stress, todo.on_strain, target - done), strain, 0
@@ -64,7 +66,7 @@ def path(specimen: Specimen, stage: Path, state: Any, strain: Array) -> Iterator
             if moment.steps[0] > seen:
                 row, seen = row + 1, moment.steps[0]
                 fraction = (number + float(moment.fraction[0])) / len(todo.targets)
-                yield Point(stage.name, row, fraction, base + moment.strain[0], moment.state)
+                yield Point(stage.name, row, fraction, base + moment.strain[0], moment.state, number)
         state, strain = moment.state, base + moment.strain[0]
         steps, work, error = steps + int(moment.steps[0]), work + int(moment.work[0]), error + float(moment.error[0])
         if moment.ended[0] != DONE:
