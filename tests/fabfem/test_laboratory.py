@@ -182,7 +182,7 @@ def test_stress_control_passes_the_limit_of_mohr_coulomb(tmp_path: Path) -> None
 
 
 def test_stress_control_passes_the_peak_of_sand_on_the_curve_of_strain_control(tmp_path: Path) -> None:
-    by_stress = {"kind": "triaxial", "drainage": "drained", "q": 350.0, "strain_limit": 0.12, "increments": 20}
+    by_stress = {"kind": "triaxial", "drainage": "drained", "q": 350.0, "strain_limit": 0.12, "increments": 40}
     by_strain = {"kind": "triaxial", "drainage": "drained", "axial_strain": 0.15, "increments": 60}
     dense = {**SAND, "void_ratio": 0.69}
     led, report = run(tmp_path / "stress", dense, by_stress)
