@@ -7,7 +7,11 @@ from typing import Any
 from fabfem.case import Case, read_case
 from fabfem.outcome import Description, Outcome
 
-SCENES = {"boundary_value": "fabfem.boundary_value.run", "fabric": "fabfem.fabric_tests.run"}
+SCENES = {
+    "boundary_value": "fabfem.boundary_value.run",
+    "element": "fabfem.laboratory.run",
+    "fabric": "fabfem.fabric_tests.run",
+}
 """Module that runs each kind of scene; it has `describe(case)` and `run(case, folder, quiet)`."""
 
 

@@ -5,6 +5,7 @@ names that only those can vouch for are checked when the problem is built, with 
 """
 
 from fabfem.case.boundary_value import BoundaryValueCase
+from fabfem.case.element import ElementCase
 from fabfem.case.fabric import FabricCase
 from fabfem.case.names import boundaries_of, zones_named
 from fabfem.case.reader import case_from, read_case, resolved
@@ -16,6 +17,7 @@ __all__ = [
     "BoundaryValueCase",
     "Case",
     "CaseError",
+    "ElementCase",
     "FabricCase",
     "boundaries_of",
     "case_from",

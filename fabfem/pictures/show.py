@@ -11,7 +11,7 @@ import sys
 from collections.abc import Sequence
 from importlib import import_module
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from fabfem.case import CaseError
 from fabfem.output.history import read_history
@@ -19,7 +19,7 @@ from fabfem.output.history import read_history
 DRAW = (sys.executable, "-m", "fabfem.pictures.draw")
 """Command that draws the fields of the folder it is given."""
 
-DRAWERS = {"fabric": "fabfem.pictures.curves"}
+DRAWERS = {"fabric": "fabfem.pictures.curves", "element": "fabfem.pictures.laboratory"}
 """Module that draws the pictures of a kind of scene which is no boundary-value problem; it has `draw(folder)`."""
 
 TIME_LIMIT = 600.0
@@ -55,7 +55,7 @@ def show(folder: Path) -> Shown:
     """
     if not (folder / "history.csv").is_file():
         raise CaseError(f"{folder}: holds no result (there is no history.csv)")
-    drawer = DRAWERS.get(str(_report(folder).get("kind")))
+    drawer = DRAWERS.get(_kind(folder))
     if drawer:
         return Shown(tuple(import_module(drawer).draw(folder)), "")
     pictures = [*_curve(folder)]
@@ -118,6 +118,12 @@ def _axis(header: str) -> str:
 def _report(folder: Path) -> dict[str, object]:
     path = folder / "report.json"
     return json.loads(path.read_text(encoding="utf-8")) if path.is_file() else {}
+
+
+def _kind(folder: Path) -> str:
+    """Return the kind of scene that a result is of."""
+    case: Any = _report(folder).get("resolved_case", {})
+    return str(case.get("scene", {}).get("kind", "boundary_value"))
 
 
 def _columns(folder: Path) -> dict[str, list[str]]:
