@@ -182,7 +182,7 @@ def test_stress_control_passes_the_limit_of_mohr_coulomb(tmp_path: Path) -> None
 
 
 def test_stress_control_passes_the_peak_of_sand_on_the_curve_of_strain_control(tmp_path: Path) -> None:
-    by_stress = {"kind": "triaxial", "drainage": "drained", "q": 350.0, "strain_limit": 0.12, "increments": 40}
+    by_stress = {"kind": "triaxial", "drainage": "drained", "q": 350.0, "strain_limit": 0.15, "increments": 40}
     by_strain = {"kind": "triaxial", "drainage": "drained", "axial_strain": 0.15, "increments": 60}
     dense = {**SAND, "void_ratio": 0.69}
     led, report = run(tmp_path / "stress", dense, by_stress)
@@ -192,7 +192,7 @@ def test_stress_control_passes_the_peak_of_sand_on_the_curve_of_strain_control(t
     assert {"characteristic", "peak"} <= set(entry["states"])
     assert led["q"][-1] < 0.95 * led["q"].max()
     along = driven["strain_zz"][5:][driven["strain_zz"][5:] < led["strain_zz"][-1]]
-    assert along[-1] > 0.09
+    assert along[-1] > 0.1
     expected = np.interp(along, driven["strain_zz"], driven["q"])
     np.testing.assert_allclose(np.interp(along, led["strain_zz"], led["q"]), expected, rtol=0.005)
 
