@@ -10,12 +10,13 @@ from dataclasses import dataclass
 
 import umat
 from fabfem.boundary_value.fields import known_fields
+from fabfem.boundary_value.meshes import mesh_of, mesh_place
 from fabfem.boundary_value.omitted import left_out
 from fabfem.boundary_value.probes import Column, columns
 from fabfem.boundary_value.program import ground_stress, program, zones_of
 from fabfem.case import BoundaryValueCase, CaseError, boundaries_of, nearest, suggest
 from fabfem.fem.kinematics import KINEMATICS
-from fabfem.fem.mesh import Mesh, read_mesh
+from fabfem.fem.mesh import Mesh
 from fabfem.fem.model import Controls, Model, Zone
 from fabfem.fem.space import Space, build_space
 from fabfem.fem.stages import Stage
@@ -67,11 +68,11 @@ def build(case: BoundaryValueCase) -> Problem:
 
 
 def _space(case: BoundaryValueCase) -> Space:
-    with _blamed(case, "mesh.file"):
-        mesh = read_mesh(case.locate(case.mesh.file), case.mesh.order)
+    with _blamed(case, mesh_place(case)):
+        mesh = mesh_of(case)
     _check_names(case, mesh)
-    with _blamed(case, "scene.kinematics"):
-        return build_space(mesh, KINEMATICS[case.scene.kinematics])
+    with _blamed(case, "mesh.points" if case.mesh.points else "scene.kinematics"):
+        return build_space(mesh, KINEMATICS[case.scene.kinematics], case.mesh.points)
 
 
 def _substance(case: BoundaryValueCase, name: str, space: Space) -> Substance:

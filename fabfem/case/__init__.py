@@ -6,7 +6,7 @@ names that only those can vouch for are checked when the problem is built, with 
 
 from fabfem.case.boundary_value import BoundaryValueCase
 from fabfem.case.names import boundaries_of
-from fabfem.case.reader import case_from, read_case, resolved
+from fabfem.case.reader import case_from, read_case, read_tables, resolved
 from fabfem.case.schema import Case
 from fabfem.case.sentences import CaseError
 from fabfem.case.table import nearest, suggest
@@ -19,6 +19,7 @@ __all__ = [
     "case_from",
     "nearest",
     "read_case",
+    "read_tables",
     "resolved",
     "suggest",
 ]

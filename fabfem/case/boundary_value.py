@@ -4,6 +4,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
+from fabfem.case.mesh import Mesh
 from fabfem.case.schema import AnyScene, Case
 from fabfem.case.stages import AnyStage, Component, Support
 from fabfem.case.table import Factors, Identifier, Names, NotNegative, Positive, Table, Text
@@ -16,15 +17,6 @@ class Scene(AnyScene):
     """Kind of scene."""
     kinematics: Literal["plane_strain", "axisymmetric", "axisymmetric_torsion", "solid"]
     """Displacements that the scene has, and the strains they make."""
-
-
-class Mesh(Table):
-    """The mesh."""
-
-    file: Text
-    """File in any format of meshio, with named boundaries and zones; relative to the case file."""
-    order: Annotated[int, Field(ge=1, le=2)] = 2
-    """Order of the displacement in an element."""
 
 
 class Solver(Table):
