@@ -74,6 +74,34 @@ def _check(options: argparse.Namespace) -> int:
     return DONE
 
 
+def _sweep(options: argparse.Namespace) -> int:
+    from fabfem.study.sweep import sweep
+
+    swept = sweep(options.case, _folder(options, "sweep"), options.quiet)
+    if not options.quiet:
+        print(f"{swept.completed} of {swept.runs} runs completed\n  {swept.table}")
+    return DONE if swept.completed == swept.runs else STOPPED
+
+
+def _study(options: argparse.Namespace) -> int:
+    from fabfem.pictures.work_precision import draw
+    from fabfem.study.work_precision import study
+
+    try:
+        found = study(options.case, _folder(options, "study"), options.quiet)
+    except KeyboardInterrupt:
+        return _fail("interrupted; runs that ended are kept, and the same command goes on from there", INTERRUPTED)
+    picture = draw(found.folder)
+    if not options.quiet:
+        print(*found.sentences, f"  {found.folder / 'study.csv'}", f"  {picture}", sep="\n")
+    return DONE
+
+
+def _folder(options: argparse.Namespace, what: str) -> Path:
+    """Return where the results of many runs of a case go."""
+    return options.out or Path("results") / f"{options.case.stem}_{what}"
+
+
 def _show(options: argparse.Namespace) -> int:
     from fabfem.pictures.show import show
 
@@ -101,6 +129,16 @@ def _parser() -> argparse.ArgumentParser:
     check = commands.add_parser("check", parents=[common], help="validate a case and say what its scene leaves out")
     check.add_argument("case", type=Path, metavar="CASE.toml")
     check.set_defaults(command=_check)
+
+    sweep = commands.add_parser("sweep", parents=[common], help="run a case with the product of some parameters")
+    sweep.add_argument("case", type=Path, metavar="CASE.toml")
+    sweep.add_argument("--out", type=Path, metavar="DIR", help="folder of the results (default: results/CASE_sweep)")
+    sweep.set_defaults(command=_sweep)
+
+    study = commands.add_parser("study", parents=[common], help="error against run time for the settings of a case")
+    study.add_argument("case", type=Path, metavar="CASE.toml")
+    study.add_argument("--out", type=Path, metavar="DIR", help="folder of the results (default: results/CASE_study)")
+    study.set_defaults(command=_study)
 
     show = commands.add_parser("show", parents=[common], help="draw pictures of a result")
     show.add_argument("folder", type=Path, metavar="DIR")

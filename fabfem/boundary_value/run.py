@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from pathlib import Path
 
-from fabfem.boundary_value.omitted import remaining
+from fabfem.boundary_value.omitted import memory, remaining
 from fabfem.boundary_value.problem import Problem, build
 from fabfem.boundary_value.record import PHASES, Recorder
 from fabfem.case import BoundaryValueCase
@@ -24,7 +24,7 @@ def describe(case: BoundaryValueCase) -> Description:
         If the case cannot be run.
     """
     problem = build(case)
-    return Description(problem.omitted, tuple(remaining(problem.model)))
+    return Description(problem.omitted, tuple(remaining(problem.model)), memory(problem.model))
 
 
 def run(case: BoundaryValueCase, folder: Path, quiet: bool, timer: Timer | None = None) -> Outcome:

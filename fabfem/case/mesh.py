@@ -48,9 +48,7 @@ class Box(Table):
         if self.cells is not None:
             return self.cells
         assert self.size is not None
-        return tuple(
-            max(1, round((high - low) / self.size)) for low, high in zip(self.lower, self.upper, strict=True)
-        )
+        return tuple(max(1, round((high - low) / self.size)) for low, high in zip(self.lower, self.upper, strict=True))
 
 
 class Mesh(Table):

@@ -26,6 +26,8 @@ class Parameter(Table):
     """Place in the case, or places, that have the value."""
     values: Values
     """Values that it takes."""
+    set: dict[str, Value] = Field(default={})
+    """Values by place that go with all of them."""
 
 
 class Runs(Table):
@@ -63,7 +65,7 @@ class Quantity(Table):
     column: Text
     """Column, without its unit."""
     take: Literal["last", "largest", "smallest", "at", "curve"] = "last"
-    """What of the column: its last, largest or smallest value, that `at` a reading, or all of it over another column."""
+    """What of the column: its last, largest or smallest value, that at a reading, or all of it over another."""
     at: Reading | None = None
     """Where it is read, for ``at``."""
     over: Text | None = None
