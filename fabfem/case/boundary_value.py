@@ -90,6 +90,20 @@ class Output(Table):
     """Smoothed at nodes, raw means in cells, or both."""
 
 
+class Errors(Table):
+    """Estimates of its own error that a run carries, a column of the history each."""
+
+    estimate: Annotated[
+        tuple[Literal["equilibrium", "integration", "discretisation", "directions"], ...],
+        Field(min_length=1, strict=False),
+    ]
+    """What is estimated."""
+    rule: Text = "lebedev_23"
+    """Second rule of contact directions, with which the directions' error is estimated."""
+    samples: Annotated[int, Field(ge=1)] = 16
+    """Points of each zone that go through the second rule."""
+
+
 class BoundaryValueCase(Case):
     """A boundary-value problem as its file states it."""
 
@@ -111,3 +125,5 @@ class BoundaryValueCase(Case):
     """Columns made from others."""
     output: Output | None = None
     """Fields to store; none when left out."""
+    errors: Errors | None = None
+    """Errors to estimate; none when left out."""

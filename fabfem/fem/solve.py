@@ -72,6 +72,10 @@ class Increment:
     worst_point: int
     """Point with the largest integration error, and the error."""
     worst_error: float
+    local_error: np.ndarray
+    """(npoints,) integration error of every point in this increment."""
+    tangent: np.ndarray
+    """(npoints, 6, 6) tangent of every point."""
     timings: dict[str, float]
     """Seconds spent in material, assembly, linear_solve, tries that failed included."""
 
@@ -241,5 +245,7 @@ def _increment(
         cutbacks=step.cutbacks,
         worst_point=trial.batch.worst_point,
         worst_error=trial.batch.worst_error,
+        local_error=trial.batch.error,
+        tangent=trial.batch.tangent,
         timings=timings,
     )

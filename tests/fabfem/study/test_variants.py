@@ -1,5 +1,6 @@
 """Places in a case, and the variants that other values there make."""
 
+import re
 from typing import Any
 
 import pytest
@@ -51,9 +52,8 @@ def test_a_value_is_put_at_a_place_and_nothing_else_changes(name: str) -> None:
 @pytest.mark.parametrize("name", NO_PLACES)
 def test_a_place_that_is_not_there_gets_a_sentence(name: str) -> None:
     place, said = NO_PLACES[name]
-    with pytest.raises(CaseError, match=".") as caught:
+    with pytest.raises(CaseError, match=re.escape(said)):
         with_value(TABLES, place, 1)
-    assert said in str(caught.value)
 
 
 def test_a_variant_says_nothing_about_other_runs() -> None:
