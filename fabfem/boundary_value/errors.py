@@ -2,13 +2,13 @@
 
 * ``equilibrium``: the force that the last iteration left out of balance, with the drag of the viscosity, over the
   forces at work.
-* ``integration``: the relative error of the stress that the points estimate for their own steps, root mean square over
-  the volume, added up over the increments. Materials in closed form have none.
+* ``integration``: the error of the stress that the points estimate for their own steps, over the stress, both root mean
+  square over the volume, added up over the increments. Materials in closed form have none.
 * ``discretisation``: of the mesh, in the energy norm, from the recovered stress (`fabfem.fem.recovery`), over the norm
   of the stress. The field ``discretisation_error`` says where: the root of the error's energy density over the mean
   energy density.
 * ``directions``: of the set of contact directions. Some points of each zone, spread evenly over its volume, go through
-  the same strains with a second rule; the distance of the two stresses over the second, root mean square.
+  the same strains with a second rule; the distance of the two stresses over the first, both root mean square.
 """
 
 from collections.abc import Callable, Mapping
@@ -48,9 +48,7 @@ class Discretisation:
     def energies(self, increment: Increment) -> tuple[Array, Array]:
         """Return the (nel,) energies of the error and of the stress."""
         zones, space = self.model.zones, self.model.space
-        stress = np.empty((space.npoints, 6))
-        for name, zone in zones.items():
-            stress[zone.points] = increment.states[name].stress
+        stress = _stress(self.model, increment)
         points = elastic_tangents(zones, increment.states, space.npoints).reshape(-1, space.nq, 6, 6)
         elastic = points[:, nearest(space, self.fine)].reshape(-1, 6, 6)
         within = stress_within(space, self.fine, stress, increment.tangent, increment.displacement)
@@ -77,12 +75,14 @@ class Integration:
     """The error of the points' integration, added up."""
 
     def __init__(self, model: Model) -> None:
-        self.share = model.space.weights / model.space.weights.sum()
+        self.model, self.weights = model, model.space.weights
         self.total = 0.0
 
     def value(self, increment: Increment) -> float:
         """Return the sum over all increments so far."""
-        self.total += float(np.sqrt(self.share @ increment.local_error**2))
+        size = norm(_stress(self.model, increment))
+        whole = float(np.sqrt(self.weights @ size**2))
+        self.total += float(np.sqrt(self.weights @ (increment.local_error * size) ** 2)) / whole if whole else 0.0
         return self.total
 
 
@@ -111,9 +111,9 @@ class Directions:
         """Return the distance of the stresses by the two rules; nothing where the second refused all points."""
         strain = self.model.space.strain(increment.displacement - self._before(increment))
         self._last = increment
-        gaps = [self._follow(name, strain, increment) for name in self.sampled]
-        found = np.concatenate(gaps)
-        return float(np.sqrt(np.mean(found**2))) if len(found) else ""
+        followed = [self._follow(name, strain, increment) for name in self.sampled]
+        gaps, stress = (np.concatenate(part) for part in zip(*followed, strict=True))
+        return float(np.sqrt(np.sum(gaps**2) / np.sum(stress**2))) if stress.any() else ""
 
     def _before(self, increment: Increment) -> Array:
         """Return the displacement from which an increment set out."""
@@ -123,15 +123,14 @@ class Directions:
         moved_on = last.stage_index != increment.stage_index
         return last.displacement * (not (moved_on and self.model.stages[last.stage_index].zero_displacement))
 
-    def _follow(self, name: str, strain: Array, increment: Increment) -> Array:
-        """Lead the samples of a zone through the strain increment, and return the distance of the stresses."""
+    def _follow(self, name: str, strain: Array, increment: Increment) -> tuple[Array, Array]:
+        """Lead the samples of a zone on; return the distance of the stresses and the size of the first."""
         sampled, old, alive = self.sampled[name], self.states[name], self.alive[name]
         response = umat.update(sampled.second.material, sampled.second.directions, strain[sampled.ids], old)
         self.states[name] = response.state
         alive &= response.status == OK
         first = increment.states[name].stress[sampled.within]
-        size = np.maximum(norm(response.stress), np.finfo(float).tiny)
-        return (norm(first - response.stress) / size)[alive]
+        return norm(first - response.stress)[alive], norm(first)[alive]
 
 
 def error_columns(
@@ -173,6 +172,14 @@ def _seconds(case: BoundaryValueCase, second: Callable[[str], Mapping[str, Subst
     if not found:
         raise CaseError(f"{case.path.name}: errors.estimate: no material here has contact directions")
     return found
+
+
+def _stress(model: Model, increment: Increment) -> Array:
+    """Return the (npoints, 6) stress of all points."""
+    stress = np.empty((model.space.npoints, 6))
+    for name, zone in model.zones.items():
+        stress[zone.points] = increment.states[name].stress
+    return stress
 
 
 def _ids(zone: Zone, model: Model) -> Array:

@@ -19,6 +19,8 @@ from fabfem.fem.space import Space, build_space
 
 ENOUGH = 2
 """Points of a patch for each coefficient of the polynomial."""
+SLIGHT = 1e-3
+"""Singular value below which points do not determine a coefficient, over the root of their number."""
 
 
 def fine_space(space: Space) -> Space:
@@ -116,8 +118,7 @@ def _fits(space: Space, elements: np.ndarray) -> dict[int, tuple[np.ndarray, np.
 def _patch(space: Space, elements: list[int], around: dict[int, list[int]]) -> list[int]:
     """Return the elements around a node, with those around them where they have too few points."""
     ncorner = len(space.mesh.element.corners)
-    wanted = ENOUGH * monomials(np.zeros((1, space.mesh.dim)), _degree(space)).shape[1]
-    while len(elements) * space.nq < wanted:
+    while not _determined(_places(space, elements)[1], _degree(space)):
         nodes = np.unique(space.mesh.cells[elements, :ncorner])
         wider = sorted({element for node in nodes.tolist() for element in around[node]})
         if len(wider) == len(elements):
@@ -127,11 +128,26 @@ def _patch(space: Space, elements: list[int], around: dict[int, list[int]]) -> l
 
 
 def _fit(space: Space, node: int, elements: list[int]) -> tuple[np.ndarray, np.ndarray, float, np.ndarray]:
-    points = np.sort((np.array(elements)[:, None] * space.nq + np.arange(space.nq)).ravel())
+    points, places = _places(space, elements)
     origin = space.mesh.points[node]
-    away = space.points[points] - origin
+    away = places - origin
     size = float(np.abs(away).max())
     return points, origin, size, np.linalg.pinv(monomials(away / size, _degree(space)), rcond=1e-10)
+
+
+def _places(space: Space, elements: list[int]) -> tuple[np.ndarray, np.ndarray]:
+    """Return the points of some elements, in order, and where they are."""
+    points = np.sort((np.array(elements)[:, None] * space.nq + np.arange(space.nq)).ravel())
+    return points, space.points[points]
+
+
+def _determined(places: np.ndarray, degree: int) -> bool:
+    """Return whether points determine a polynomial well: enough of them, and not in too few layers."""
+    middle = places.mean(axis=0)
+    terms = monomials((places - middle) / max(float(np.abs(places - middle).max()), np.finfo(float).tiny), degree)
+    if len(terms) < ENOUGH * terms.shape[1]:
+        return False
+    return bool(np.linalg.matrix_rank(terms, tol=SLIGHT * np.sqrt(len(terms))) == terms.shape[1])
 
 
 def monomials(places: np.ndarray, degree: int) -> np.ndarray:
