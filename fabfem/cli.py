@@ -97,6 +97,20 @@ def _study(options: argparse.Namespace) -> int:
     return DONE
 
 
+def _calibrate(options: argparse.Namespace) -> int:
+    from fabfem.pictures.calibration import draw
+    from fabfem.study.calibrate import calibrate
+
+    try:
+        found = calibrate(options.case, _folder(options, "calibrate"), options.quiet)
+    except KeyboardInterrupt:
+        return _fail("interrupted; runs that ended are kept, and the same command goes on from there", INTERRUPTED)
+    picture = draw(found.folder)
+    if not options.quiet:
+        print(*found.sentences, f"  {found.folder / 'calibration.json'}", f"  {picture}", sep="\n")
+    return DONE
+
+
 def _folder(options: argparse.Namespace, what: str) -> Path:
     """Return where the results of many runs of a case go."""
     return options.out or Path("results") / f"{options.case.stem}_{what}"
@@ -130,15 +144,18 @@ def _parser() -> argparse.ArgumentParser:
     check.add_argument("case", type=Path, metavar="CASE.toml")
     check.set_defaults(command=_check)
 
-    sweep = commands.add_parser("sweep", parents=[common], help="run a case with the product of some parameters")
-    sweep.add_argument("case", type=Path, metavar="CASE.toml")
-    sweep.add_argument("--out", type=Path, metavar="DIR", help="folder of the results (default: results/CASE_sweep)")
-    sweep.set_defaults(command=_sweep)
-
-    study = commands.add_parser("study", parents=[common], help="error against run time for the settings of a case")
-    study.add_argument("case", type=Path, metavar="CASE.toml")
-    study.add_argument("--out", type=Path, metavar="DIR", help="folder of the results (default: results/CASE_study)")
-    study.set_defaults(command=_study)
+    many = {
+        "sweep": (_sweep, "run a case with the product of some parameters"),
+        "study": (_study, "error against run time for the settings of a case"),
+        "calibrate": (_calibrate, "fit parameters of a case to measured curves"),
+    }
+    for name, (command, what) in many.items():
+        runs = commands.add_parser(name, parents=[common], help=what)
+        runs.add_argument("case", type=Path, metavar="CASE.toml")
+        runs.add_argument(
+            "--out", type=Path, metavar="DIR", help=f"folder of the results (default: results/CASE_{name})"
+        )
+        runs.set_defaults(command=command)
 
     show = commands.add_parser("show", parents=[common], help="draw pictures of a result")
     show.add_argument("folder", type=Path, metavar="DIR")

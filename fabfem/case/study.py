@@ -198,7 +198,9 @@ class Calibration(Runs):
     """Parameters that are fitted."""
     stage: Text | None = None
     """Stage whose rows count; all when left out."""
-    tolerance: Positive = 1e-4
-    """Change of the parameters, over their size, at which the fit is done."""
+    tolerance: Positive = 1e-3
+    """Change of the parameters, over the distance of their bounds, at which the fit is done."""
+    step: Positive = 0.01
+    """Step of the derivatives, over the distance of the bounds; larger than what the runs' own errors blur."""
     evaluations: Annotated[int, Field(ge=1)] = 30
     """Most sets of parameters tried, besides those of the derivatives."""

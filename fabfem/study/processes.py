@@ -10,7 +10,8 @@ from contextlib import contextmanager
 from multiprocessing.connection import Connection, wait
 from multiprocessing.context import SpawnProcess
 from pathlib import Path
-from typing import NamedTuple
+from types import TracebackType
+from typing import NamedTuple, Self
 
 from fabfem.study.worker import Ran, Task, serve, single_threaded
 
@@ -95,26 +96,45 @@ def fits(wanted: float, taken: Sequence[float], allowed: Limits) -> bool:
     return not taken or (len(taken) < allowed.workers and wanted + sum(taken) <= allowed.memory)
 
 
-def run_all(jobs: Sequence[Job], allowed: Limits) -> Iterator[tuple[int, Ran]]:
-    """Yield the number of each job and what became of it, as they end; leaving the loop ends all processes."""
-    todo, idle = list(enumerate(jobs)), list[_Worker]()
-    busy: dict[Connection, tuple[int, _Worker]] = {}
-    try:
-        while todo or busy:
-            while todo and fits(todo[0][1].memory, [jobs[n].memory for n, _ in busy.values()], allowed):
-                number, job = todo.pop(0)
-                worker = idle.pop() if idle else _Worker(allowed.threads)
-                worker.connection.send(job.task)
-                busy[worker.connection] = number, worker
-            for ready in wait(list(busy)):
-                number, worker = busy.pop(ready)  # type: ignore[call-overload]
-                answer = worker.answer()
-                if worker.process.is_alive():
-                    idle.append(worker)
-                yield number, answer
-    finally:
-        for worker in (*idle, *(worker for _, worker in busy.values())):
+class Pool:
+    """Processes that stay between lists of jobs; leaving it ends them all."""
+
+    def __init__(self, allowed: Limits) -> None:
+        self.allowed = allowed
+        self._idle: list[_Worker] = []
+        self._busy: dict[Connection, tuple[int, _Worker]] = {}
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        for worker in (*self._idle, *(worker for _, worker in self._busy.values())):
             worker.end()
+        self._idle.clear()
+        self._busy.clear()
+
+    def run(self, jobs: Sequence[Job]) -> Iterator[tuple[int, Ran]]:
+        """Yield the number of each job and what became of it, as they end."""
+        todo = list(enumerate(jobs))
+        while todo or self._busy:
+            while todo and fits(todo[0][1].memory, [jobs[n].memory for n, _ in self._busy.values()], self.allowed):
+                self._begin(*todo.pop(0))
+            for ready in wait(list(self._busy)):
+                yield self._ended(ready)  # type: ignore[arg-type]
+
+    def _begin(self, number: int, job: Job) -> None:
+        worker = self._idle.pop() if self._idle else _Worker(self.allowed.threads)
+        worker.connection.send(job.task)
+        self._busy[worker.connection] = number, worker
+
+    def _ended(self, ready: Connection) -> tuple[int, Ran]:
+        number, worker = self._busy.pop(ready)
+        answer = worker.answer()
+        if worker.process.is_alive():
+            self._idle.append(worker)
+        return number, answer
 
 
 @contextmanager

@@ -16,7 +16,7 @@ from fabfem.case import Case, case_from
 from fabfem.output.atomic import write_atomic
 from fabfem.output.history import read_history
 from fabfem.run import describe_case
-from fabfem.study.processes import LEAST, Job, Limits, run_all
+from fabfem.study.processes import LEAST, Job, Pool
 from fabfem.study.variants import ABOUT_RUNS, Choice, Tables, variant
 from fabfem.study.worker import FINAL, Ran, Task
 
@@ -63,7 +63,7 @@ class Plan(NamedTuple):
     """Timings of each run."""
 
 
-def runs(plan: Plan, allowed: Limits) -> Iterator[Run]:
+def runs(plan: Plan, pool: Pool) -> Iterator[Run]:
     """Yield the runs of a plan as they end; those that are kept from before come first, equal ones run once.
 
     Raises
@@ -82,7 +82,7 @@ def runs(plan: Plan, allowed: Limits) -> Iterator[Run]:
             jobs[task.folder] = Job(task, memory)
             wanted.setdefault(task.folder, []).append(choice)
     todo = list(jobs.values())
-    for number, ran in run_all(todo, allowed):
+    for number, ran in pool.run(todo):
         folder = todo[number].task.folder
         _keep(todo[number].task, ran)
         yield from (Run(choice, folder, ran) for choice in wanted[folder])

@@ -16,7 +16,7 @@ from fabfem.case.study import Sweep
 from fabfem.outcome import make_folder
 from fabfem.output.atomic import write_atomic
 from fabfem.output.history import read_history
-from fabfem.study.processes import limits
+from fabfem.study.processes import Pool, limits
 from fabfem.study.progress import shown, text
 from fabfem.study.store import Plan, Run, name_of, runs
 from fabfem.study.variants import choices
@@ -52,9 +52,10 @@ def sweep(path: Path, folder: Path, quiet: bool = False) -> Swept:
     make_folder(folder)
     plan = Plan(read_tables(path), path, folder, wanted)
     done: dict[Any, Run] = {}
-    for run in shown(runs(plan, limits(said.workers, said.memory)), len(wanted), quiet):
-        done[run.choice] = run
-        _write(folder / "sweep.csv", said, [done[choice] for choice in wanted if choice in done], case.path.name)
+    with Pool(limits(said.workers, said.memory)) as pool:
+        for run in shown(runs(plan, pool), len(wanted), quiet):
+            done[run.choice] = run
+            _write(folder / "sweep.csv", said, [done[choice] for choice in wanted if choice in done], case.path.name)
     ended = [run.ran.status for run in done.values()]
     return Swept(folder / "sweep.csv", len(ended), ended.count("completed"))
 

@@ -20,7 +20,7 @@ from fabfem.case.study import Study
 from fabfem.outcome import make_folder
 from fabfem.output.atomic import write_atomic
 from fabfem.study.convergence import pareto
-from fabfem.study.processes import limits
+from fabfem.study.processes import Pool, limits
 from fabfem.study.progress import label, shown, text
 from fabfem.study.quantity import QuantityError, distance, quantity_of
 from fabfem.study.store import Plan, Run, runs
@@ -61,8 +61,8 @@ def study(path: Path, folder: Path, quiet: bool = False) -> Studied:
     wanted = wanted_choices(said)
     make_folder(folder)
     plan = Plan(read_tables(path), path, folder, wanted, said.repeat)
-    ended = list(shown(runs(plan, limits(said.workers, said.memory)), len(wanted), quiet))
-    found = {run.choice: run for run in ended}
+    with Pool(limits(said.workers, said.memory)) as pool:
+        found = {run.choice: run for run in shown(runs(plan, pool), len(wanted), quiet)}
     values, troubles = _values(said, found)
     known = truth(said, values, path.name)
     rows = [_measured(said, found[choice], values, known, troubles) for choice in _listed(said, wanted)]
