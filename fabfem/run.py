@@ -7,7 +7,10 @@ from typing import Any
 from fabfem.case import Case, read_case
 from fabfem.outcome import Description, Outcome
 
-SCENES = {"boundary_value": "fabfem.boundary_value.run"}
+SCENES = {
+    "boundary_value": "fabfem.boundary_value.run",
+    "element": "fabfem.laboratory.run",
+}
 """Module that runs each kind of scene; it has `describe(case)` and `run(case, folder, quiet)`."""
 
 

@@ -5,6 +5,7 @@ names that only those can vouch for are checked when the problem is built, with 
 """
 
 from fabfem.case.boundary_value import BoundaryValueCase
+from fabfem.case.element import ElementCase
 from fabfem.case.names import boundaries_of
 from fabfem.case.reader import case_from, read_case, read_tables, resolved
 from fabfem.case.schema import Case
@@ -15,6 +16,7 @@ __all__ = [
     "BoundaryValueCase",
     "Case",
     "CaseError",
+    "ElementCase",
     "boundaries_of",
     "case_from",
     "nearest",

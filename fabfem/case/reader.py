@@ -9,6 +9,8 @@ from pydantic import ValidationError
 
 from fabfem.case.boundary_value import BoundaryValueCase
 from fabfem.case.contradictions import contradictions
+from fabfem.case.element import ElementCase
+from fabfem.case.element import contradictions as element_contradictions
 from fabfem.case.schema import Case
 from fabfem.case.sentences import CaseError, sentence
 from fabfem.case.table import suggest
@@ -16,6 +18,7 @@ from fabfem.case.toml import write_toml
 
 KINDS: dict[str, tuple[type[Case], Callable[[Any], Iterator[tuple[str, str]]]]] = {
     "boundary_value": (BoundaryValueCase, contradictions),
+    "element": (ElementCase, element_contradictions),
 }
 """What a case of each kind of scene may say, and the search for what no single table can see."""
 

@@ -10,7 +10,7 @@ import subprocess
 import sys
 from collections.abc import Sequence
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from fabfem.case import CaseError
 from fabfem.output.history import read_history
@@ -51,6 +51,10 @@ def show(folder: Path) -> Shown:
     """
     if not (folder / "history.csv").is_file():
         raise CaseError(f"{folder}: holds no result (there is no history.csv)")
+    if _kind(folder) == "element":
+        from fabfem.pictures import laboratory
+
+        return Shown(tuple(laboratory.draw(folder)), "")
     pictures = [*_curve(folder)]
     before = {picture.name: picture.stat().st_mtime_ns for picture in folder.glob("*.png")}
     trouble = _draw_fields(folder) if (folder / "fields_0000.vtu").is_file() else ""
@@ -111,6 +115,12 @@ def _axis(header: str) -> str:
 def _report(folder: Path) -> dict[str, object]:
     path = folder / "report.json"
     return json.loads(path.read_text(encoding="utf-8")) if path.is_file() else {}
+
+
+def _kind(folder: Path) -> str:
+    """Return the kind of scene that a result is of."""
+    case: Any = _report(folder).get("resolved_case", {})
+    return str(case.get("scene", {}).get("kind", "boundary_value"))
 
 
 def _columns(folder: Path) -> dict[str, list[str]]:
