@@ -50,12 +50,15 @@ def _fail(message: str, status: int) -> int:
 
 
 def _solve(options: argparse.Namespace) -> int:
-    from fabfem.run import run_case
+    from fabfem.case import read_case
+    from fabfem.run import remember_cost, run_case
 
-    outcome = run_case(options.case, options.out or Path("results") / options.case.stem, quiet=options.quiet)
+    case = read_case(options.case)
+    outcome = run_case(case, options.out or Path("results") / options.case.stem, quiet=options.quiet)
     if not options.quiet:
         print(outcome.summary())
     if outcome.status == "completed":
+        remember_cost(case, outcome.folder)
         return DONE
     return _fail(outcome.reason, INTERRUPTED if outcome.status == "interrupted" else STOPPED)
 
@@ -63,14 +66,16 @@ def _solve(options: argparse.Namespace) -> int:
 def _check(options: argparse.Namespace) -> int:
     from fabfem.case import read_case, resolved
     from fabfem.output.progress import summary
-    from fabfem.run import describe_case
+    from fabfem.run import describe_case, price_case
 
     case = read_case(options.case)
     description = describe_case(case)
     if not options.quiet:
         print(resolved(case))
         print("# What the scene leaves out:", *description.omitted, sep="\n#   ")
-        print("# What remains:\n" + summary(description.remains, prefix="#   "))
+        cost = price_case(case) if options.price else ""
+        remains = (*description.remains, *([("time", cost)] if cost else []))
+        print("# What remains:\n" + summary(remains, prefix="#   "))
     return DONE
 
 
@@ -142,6 +147,7 @@ def _parser() -> argparse.ArgumentParser:
 
     check = commands.add_parser("check", parents=[common], help="validate a case and say what its scene leaves out")
     check.add_argument("case", type=Path, metavar="CASE.toml")
+    check.add_argument("--price", action="store_true", help="predict the time; the first of its kind runs for 10 s")
     check.set_defaults(command=_check)
 
     many = {
