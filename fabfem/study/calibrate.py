@@ -53,13 +53,13 @@ def calibrate(path: Path, folder: Path, quiet: bool = False) -> Calibrated:
     said = asked(case, case.calibration, "calibration")
     measured = measured_curves(said, case.locate(said.data), path.name)
     make_folder(folder)
-    start = np.array([_to_unit(fitted, fitted.start) for fitted in said.parameter])
+    start = np.array([to_unit(fitted, fitted.start) for fitted in said.parameter])
     with Pool(limits(said.workers, said.memory)) as pool:
-        fit = _Fit(case, said, measured, read_tables(path), folder, pool, Console(stderr=True, quiet=quiet))
+        fit = Fit(case, said, measured, read_tables(path), folder, pool, Console(stderr=True, quiet=quiet))
         return _write(fit, start, fit.solve(start))
 
 
-class _Fit:
+class Fit:
     """The residuals of a calibration and their derivatives, as functions of the parameters over their bounds."""
 
     def __init__(
@@ -145,7 +145,7 @@ class _Fit:
         return {name: {c: float(np.sqrt(np.mean(g**2))) for c, g in gap.items()} for name, gap in gaps.items()}
 
 
-def _to_unit(fitted: Fitted, value: float) -> float:
+def to_unit(fitted: Fitted, value: float) -> float:
     """Return where a value lies between the bounds, 0…1."""
     low, high, here = (np.log(x) if fitted.scale == "logarithmic" else x for x in (fitted.lower, fitted.upper, value))
     return float((here - low) / (high - low))
@@ -158,7 +158,7 @@ def _from_unit(fitted: Fitted, unit: float) -> float:
     return float(fitted.lower + unit * (fitted.upper - fitted.lower))
 
 
-def _write(fit: _Fit, start: Array, best: Array) -> Calibrated:
+def _write(fit: Fit, start: Array, best: Array) -> Calibrated:
     known = certainty(fit.residual(best), fit.jacobian(best))
     fit.answer([start])
     parameters = fit.said.parameter
@@ -192,7 +192,7 @@ def _fitted(parameters: Sequence[Fitted], best: Array, known: Certainty) -> list
     return found
 
 
-def _fits(fit: _Fit, best: Array) -> list[str]:
+def _fits(fit: Fit, best: Array) -> list[str]:
     """Return the root mean square difference of each test in a sentence."""
     return [
         f"Root mean square difference, {name}: {', '.join(f'{column} {gap:.3g}' for column, gap in gaps.items())}."
@@ -214,7 +214,7 @@ def _parameter_table(parameters: Sequence[Fitted], best: Array, known: Certainty
     return lines.getvalue()
 
 
-def _curve_table(fit: _Fit, best: Array) -> str:
+def _curve_table(fit: Fit, best: Array) -> str:
     lines = StringIO()
     writer = csv.writer(lines, lineterminator="\n")
     columns = [curve.data for curve in fit.said.curve]
