@@ -47,5 +47,24 @@ def describe_case(case: Case) -> Description:
     return _scene(case).describe(case)
 
 
+def price_case(case: Case) -> str:
+    """Return what a run of a case will cost in time, in words; nothing where its kind of scene cannot tell.
+
+    Raises
+    ------
+    CaseError
+        If the case cannot be run.
+    """
+    scene = _scene(case)
+    return scene.price(case) if hasattr(scene, "price") else ""
+
+
+def remember_cost(case: Case, folder: Path) -> None:
+    """Keep what the completed run in a folder has cost, for the price of the next one of its kind."""
+    scene = _scene(case)
+    if hasattr(scene, "remember"):
+        scene.remember(case, folder)
+
+
 def _scene(case: Case) -> Any:
     return import_module(SCENES[case.scene.kind])

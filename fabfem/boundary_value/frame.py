@@ -1,5 +1,6 @@
 """The fields of an increment as they are stored: smoothed at nodes, raw means in cells, tensors in VTK's order."""
 
+from fabfem.boundary_value.errors import FIELD
 from fabfem.boundary_value.fields import AT_NODES, PORE_PRESSURE, point_fields
 from fabfem.boundary_value.problem import Problem
 from fabfem.boundary_value.water import nodal_pore_pressure, point_pore_pressure
@@ -17,6 +18,8 @@ def frame(problem: Problem, output: Output, increment: Increment) -> Frame:
     """Return the fields of an increment that the case asks for."""
     space = problem.model.space
     gathered = point_fields(space, increment, output.fields)
+    if problem.mesh_error and FIELD in output.fields:
+        gathered[FIELD] = problem.mesh_error.field(increment)
     shown = {name: in_vtk_order(values) for name, values in gathered.items()}
     at_nodes = {name: _smoothed(space, values) for name, values in shown.items()} if "nodes" in output.at else {}
     in_cells = {name: space.cell_mean(values) for name, values in shown.items()} if "cells" in output.at else {}

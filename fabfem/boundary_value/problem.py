@@ -11,15 +11,18 @@ from dataclasses import dataclass
 import numpy as np
 
 import umat
+from fabfem.boundary_value.errors import FIELD, Discretisation, error_columns
 from fabfem.boundary_value.fields import known_fields
+from fabfem.boundary_value.meshes import mesh_of, mesh_place
 from fabfem.boundary_value.omitted import left_out
 from fabfem.boundary_value.probes import Column, columns
 from fabfem.boundary_value.program import Scene, ground_stress, program, zones_of
 from fabfem.boundary_value.water import pore_water
 from fabfem.case import BoundaryValueCase, CaseError, boundaries_of, nearest, suggest, zones_named
+from fabfem.case.materials import ChangHicher
 from fabfem.fem.kinematics import KINEMATICS
 from fabfem.fem.loads import loading
-from fabfem.fem.mesh import Mesh, read_mesh
+from fabfem.fem.mesh import Mesh
 from fabfem.fem.model import Controls, Model, Zone
 from fabfem.fem.pores import porous
 from fabfem.fem.solve import absent_dofs
@@ -41,6 +44,8 @@ class Problem:
         Space, zones, stages and controls.
     columns : tuple of Column
         Columns of the history.
+    mesh_error : Discretisation or None
+        Estimate of the mesh's error, where the case asks for it.
     omitted : tuple of str
         Sentences on what the scene leaves out.
     """
@@ -48,6 +53,7 @@ class Problem:
     case: BoundaryValueCase
     model: Model
     columns: tuple[Column, ...]
+    mesh_error: Discretisation | None
     omitted: tuple[str, ...]
 
 
@@ -72,25 +78,45 @@ def build(case: BoundaryValueCase) -> Problem:
         model = Model(space, zones, stages, _controls(case), case.solver.linear, water)
     with _blamed(case, "probe or reaction"):
         found = columns(case, space, stages)
+    with _blamed(case, "errors"):
+        errors, mesh_error = error_columns(case, model, lambda rule: _with_rule(case, space, rule))
     if case.solver.threads:
         umat.set_threads(case.solver.threads)
-    return Problem(case, model, found, tuple(left_out(case, space, known, substances)))
+    omitted = tuple(left_out(case, space, known, substances))
+    return Problem(case, model, (*found, *errors), mesh_error, omitted)
 
 
 def _space(case: BoundaryValueCase) -> Space:
-    with _blamed(case, "mesh.file"):
-        mesh = read_mesh(case.locate(case.mesh.file), case.mesh.order)
+    with _blamed(case, mesh_place(case)):
+        mesh = mesh_of(case)
     _check_names(case, mesh)
-    with _blamed(case, "scene.kinematics"):
-        space = build_space(mesh, KINEMATICS[case.scene.kinematics])
+    with _blamed(case, "mesh.points" if case.mesh.points else "scene.kinematics"):
+        space = build_space(mesh, KINEMATICS[case.scene.kinematics], case.mesh.points)
     with _blamed(case, "water.excess"):
         return porous(space) if case.water is not None and case.water.excess else space
 
 
 def _substance(case: BoundaryValueCase, name: str, space: Space) -> Substance:
-    flat = case.scene.kinematics in ("plane_strain", "axisymmetric")
     with _blamed(case, f"material.{name}"):
-        return substance(case.material[name], Surroundings(case.unit_system, space.mesh.dim - 1, flat))
+        return substance(case.material[name], _surroundings(case, space))
+
+
+def _surroundings(case: BoundaryValueCase, space: Space) -> Surroundings:
+    flat = case.scene.kinematics in ("plane_strain", "axisymmetric")
+    return Surroundings(case.unit_system, space.mesh.dim - 1, flat)
+
+
+def _with_rule(case: BoundaryValueCase, space: Space, rule: str) -> dict[str, Substance]:
+    """Return the substance of each zone that has contact directions, with another rule of them."""
+    found: dict[str, Substance] = {}
+    for name, table in case.material.items():
+        if isinstance(table, ChangHicher):
+            try:
+                filling = substance(table.model_copy(update={"directions": rule}), _surroundings(case, space))
+            except MisfitError as error:
+                raise CaseError(f"{case.path.name}: errors.rule: {error}") from error
+            found |= dict.fromkeys(zones_of(case, name, space.mesh), filling)
+    return found
 
 
 def _zones(case: BoundaryValueCase, name: str, space: Space, filling: Substance) -> Iterator[tuple[str, Zone]]:
@@ -152,6 +178,8 @@ def _named(case: BoundaryValueCase) -> Iterator[tuple[str, str, str]]:
 
 
 def _check_fields(case: BoundaryValueCase, known: Sequence[str]) -> None:
+    estimated = (FIELD,) if case.errors and "discretisation" in case.errors.estimate else ()
+    known = (*known, *estimated)
     for name in case.output.fields if case.output else ():
         if name not in known:
             raise CaseError(

@@ -91,7 +91,7 @@ class Recorder:
 def _head(problem: Problem) -> dict[str, Any]:
     """Return what a report says before anything has run."""
     case, units = problem.case, problem.case.unit_system
-    kinds = ("probe", "reaction", "derived")
+    kinds = ("probe", "reaction", "derived", "error")
     fields = case.output.fields if case.output else ()
     return {
         "case": case.path.name,

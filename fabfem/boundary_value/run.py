@@ -1,11 +1,14 @@
 """A boundary-value run from the case to the last row: march the problem, write what converges, say how it ended."""
 
+import json
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 from fabfem.boundary_value.audit import audited
-from fabfem.boundary_value.omitted import remaining
+from fabfem.boundary_value.omitted import memory, remaining
+from fabfem.boundary_value.price import price as price_of
+from fabfem.boundary_value.price import remember as remember_run
 from fabfem.boundary_value.problem import Problem, build
 from fabfem.boundary_value.record import PHASES, Recorder
 from fabfem.boundary_value.safety import sentence
@@ -28,7 +31,25 @@ def describe(case: BoundaryValueCase) -> Description:
         If the case cannot be run.
     """
     problem = build(case)
-    return Description(problem.omitted, tuple(remaining(problem.model)))
+    return Description(problem.omitted, tuple(remaining(problem.model)), memory(problem.model))
+
+
+def price(case: BoundaryValueCase) -> str:
+    """Return what a run of a case will cost, in a sentence; `CaseError` if it cannot be run."""
+    cost = price_of(build(case))
+    return f"about {_duration(cost.seconds)}, judged by {cost.source}"
+
+
+def remember(case: BoundaryValueCase, folder: Path) -> None:
+    """Keep what a completed run has cost, for the price of the next one of its kind."""
+    remember_run(build(case), json.loads((folder / "report.json").read_text(encoding="utf-8")))
+
+
+def _duration(seconds: float) -> str:
+    """Return a time with the unit that suits it."""
+    if seconds < 120.0:
+        return f"{seconds:.2g} s"
+    return f"{seconds / 60.0:.0f} min" if seconds < 7200.0 else f"{seconds / 3600.0:.1f} h"
 
 
 def run(case: BoundaryValueCase, folder: Path, quiet: bool, timer: Timer | None = None) -> Outcome:

@@ -8,7 +8,7 @@ from fabfem.case.boundary_value import BoundaryValueCase
 from fabfem.case.element import ElementCase
 from fabfem.case.fabric import FabricCase
 from fabfem.case.names import boundaries_of, zones_named
-from fabfem.case.reader import case_from, read_case, resolved
+from fabfem.case.reader import case_from, read_case, read_tables, resolved
 from fabfem.case.schema import Case
 from fabfem.case.sentences import CaseError
 from fabfem.case.table import nearest, suggest
@@ -23,6 +23,7 @@ __all__ = [
     "case_from",
     "nearest",
     "read_case",
+    "read_tables",
     "resolved",
     "suggest",
     "zones_named",

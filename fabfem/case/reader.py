@@ -40,7 +40,7 @@ def read_case(path: str | Path) -> Case:
         If the file cannot be read or says something impossible; the message is one sentence naming the place.
     """
     path = Path(path)
-    return case_from(_load(path), path)
+    return case_from(read_tables(path), path)
 
 
 def case_from(tables: dict[str, Any], path: str | Path = "case.toml") -> Case:
@@ -74,7 +74,8 @@ def resolved(case: Case) -> str:
     return write_toml(case.model_dump())
 
 
-def _load(path: Path) -> dict[str, Any]:
+def read_tables(path: Path) -> dict[str, Any]:
+    """Return the tables of a TOML file as they stand; `CaseError` if it cannot be read."""
     try:
         return tomllib.loads(path.read_text(encoding="utf-8"))
     except FileNotFoundError:

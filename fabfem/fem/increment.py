@@ -63,6 +63,8 @@ class Increment:
     worst_point: int
     """Point with the largest integration error, and the error."""
     worst_error: float
+    local_error: np.ndarray
+    """(npoints,) integration error of every point in this increment."""
     timings: dict[str, float]
     """Seconds spent in material, assembly, linear_solve, tries that failed included."""
     zones: Mapping[str, Zone]
@@ -207,6 +209,7 @@ def increment(
         cutbacks=step.cutbacks,
         worst_point=trial.batch.worst_point,
         worst_error=trial.batch.worst_error,
+        local_error=trial.batch.error,
         timings=timings,
         zones=system.zones,
         step=trial.step,

@@ -128,6 +128,8 @@ class Batch(NamedTuple):
     worst_point: int
     """Point with the largest integration error."""
     worst_error: float
+    error: np.ndarray
+    """(npoints,) integration error of every point."""
     held: int
     """Points that keep their old stress and state."""
 
@@ -163,7 +165,7 @@ def update_points(
     bad = np.flatnonzero(~(np.isfinite(stress).all(axis=1) & np.isfinite(tangent).all(axis=(1, 2))))
     if len(bad):
         return Refusal(f"{len(bad)} points have a stress or tangent that is not finite", int(bad[0]))
-    return Batch(stress, tangent, states, int(error.argmax()), float(error.max()), held)
+    return Batch(stress, tangent, states, int(error.argmax()), float(error.max()), error, held)
 
 
 def elastic_tangents(zones: Mapping[str, Zone], states: States, npoints: int) -> np.ndarray:
