@@ -6,7 +6,7 @@ What is wrong in a case and can only be seen here (a boundary that the mesh lack
 
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import umat
 from fabfem.boundary_value.fields import known_fields
@@ -70,8 +70,15 @@ def _space(case: BoundaryValueCase) -> Space:
     with _blamed(case, "mesh.file"):
         mesh = read_mesh(case.locate(case.mesh.file), case.mesh.order)
     _check_names(case, mesh)
-    with _blamed(case, "scene.kinematics"):
-        return build_space(mesh, KINEMATICS[case.scene.kinematics])
+    kinematics = KINEMATICS[case.scene.kinematics]
+    with _blamed(case, "mesh.points" if case.mesh.points else "scene.kinematics"):
+        return build_space(mesh, replace(kinematics, mean_dilation=_mean_dilation(case, mesh)), case.mesh.points)
+
+
+def _mean_dilation(case: BoundaryValueCase, mesh: Mesh) -> bool:
+    """Return whether the volume strain is a mean over patches: what the case says, or for linear elements."""
+    said = case.mesh.volume_strain
+    return not mesh.element.linear if said is None else said == "mean"
 
 
 def _substance(case: BoundaryValueCase, name: str, space: Space) -> Substance:

@@ -25,6 +25,10 @@ class Mesh(Table):
     """File in any format of meshio, with named boundaries and zones; relative to the case file."""
     order: Annotated[int, Field(ge=1, le=2)] = 2
     """Order of the displacement in an element."""
+    volume_strain: Literal["pointwise", "mean"] | None = None
+    """Volume strain of each point, or its mean over patches of elements; the mean when left out and the order is 1."""
+    points: Annotated[int, Field(ge=1)] | None = None
+    """Integration points of an element; its usual number when left out."""
 
 
 class Solver(Table):
