@@ -2,7 +2,8 @@
 
 A quadrilateral or hexahedron, and any quadratic element, is a patch by itself. Linear triangles and tetrahedra have one
 volume strain each, which is too many for the nodes that there are: 2 for a node of a triangle mesh and 5 to 6 for
-one of tetrahedra, where two and three unknowns leave room for one. They are gathered into patches of two and about eight,
+one of tetrahedra, where two and three unknowns leave room for one. They are gathered into patches of two and about
+eight,
 as de Souza Neto, Andrade Pires & Owen (2005) do for F̄, by joining neighbours across large faces once or three times.
 No patch reaches across the border of a zone.
 """
