@@ -1,7 +1,7 @@
 """The ``fabfem`` command.
 
-Exit status: 0 done, 1 the pictures could not be drawn, 2 bad input, 3 a run that could not go on (all that converged
-is kept), 130 interrupted. Nothing heavy is imported before a command needs it.
+Exit status: 0 done, 1 the pictures could not be drawn or an answer of the verification is wrong, 2 bad input, 3 a run
+that could not go on (all that converged is kept), 130 interrupted. Nothing heavy is imported before a command needs it.
 """
 
 import argparse
@@ -11,7 +11,7 @@ from pathlib import Path
 
 from fabfem import __version__
 
-DONE, NO_PICTURE, BAD_INPUT, STOPPED, INTERRUPTED = 0, 1, 2, 3, 130
+DONE, NO_PICTURE, RED, BAD_INPUT, STOPPED, INTERRUPTED = 0, 1, 1, 2, 3, 130
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -130,6 +130,13 @@ def _show(options: argparse.Namespace) -> int:
     return _fail(shown.trouble, NO_PICTURE) if shown.trouble else DONE
 
 
+def _verify(options: argparse.Namespace) -> int:
+    from fabfem.verification.problems import chosen
+    from fabfem.verification.report import verify
+
+    return DONE if verify(chosen(options.only), options.json, options.quiet) else RED
+
+
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="fabfem", description="Boundary-value problems in granular soil with an evolving fabric."
@@ -166,4 +173,9 @@ def _parser() -> argparse.ArgumentParser:
     show = commands.add_parser("show", parents=[common], help="draw pictures of a result")
     show.add_argument("folder", type=Path, metavar="DIR")
     show.set_defaults(command=_show)
+
+    verify = commands.add_parser("verify", parents=[common], help="run problems with known answers and compare")
+    verify.add_argument("--only", action="append", default=[], metavar="NAME", help="a problem; may be given again")
+    verify.add_argument("--json", action="store_true", help="print the rows as JSON")
+    verify.set_defaults(command=_verify)
     return parser

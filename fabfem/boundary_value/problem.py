@@ -6,7 +6,7 @@ What is wrong in a case and can only be seen here (a boundary that the mesh lack
 
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -90,10 +90,17 @@ def _space(case: BoundaryValueCase) -> Space:
     with _blamed(case, mesh_place(case)):
         mesh = mesh_of(case)
     _check_names(case, mesh)
+    kinematics = KINEMATICS[case.scene.kinematics]
     with _blamed(case, "mesh.points" if case.mesh.points else "scene.kinematics"):
-        space = build_space(mesh, KINEMATICS[case.scene.kinematics], case.mesh.points)
+        space = build_space(mesh, replace(kinematics, mean_dilation=_mean_dilation(case, mesh)), case.mesh.points)
     with _blamed(case, "water.excess"):
         return porous(space) if case.water is not None and case.water.excess else space
+
+
+def _mean_dilation(case: BoundaryValueCase, mesh: Mesh) -> bool:
+    """Return whether the volume strain is a mean over patches: what the case says, or for linear elements."""
+    said = case.mesh.volume_strain
+    return not mesh.element.linear if said is None else said == "mean"
 
 
 def _substance(case: BoundaryValueCase, name: str, space: Space) -> Substance:

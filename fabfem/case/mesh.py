@@ -66,6 +66,8 @@ class Mesh(Table):
     """Order of the displacement in an element."""
     points: Annotated[int, Field(ge=1)] | None = None
     """Integration points of an element; the element's usual number when left out."""
+    volume_strain: Literal["pointwise", "mean"] | None = None
+    """Volume strain of each point, or its mean over patches of elements; the mean when left out and the order is 1."""
 
     @model_validator(mode="after")
     def _one(self) -> "Mesh":
