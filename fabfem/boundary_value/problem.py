@@ -12,9 +12,10 @@ import numpy as np
 
 import umat
 from fabfem.boundary_value.fields import known_fields
+from fabfem.boundary_value.ground import ground_stress, zones_of
 from fabfem.boundary_value.omitted import left_out
 from fabfem.boundary_value.probes import Column, columns
-from fabfem.boundary_value.program import Scene, ground_stress, program, zones_of
+from fabfem.boundary_value.program import Scene, program
 from fabfem.case import BoundaryValueCase, CaseError, boundaries_of, nearest, suggest, zones_named
 from fabfem.fem.kinematics import KINEMATICS
 from fabfem.fem.loads import loading
