@@ -13,10 +13,11 @@ import numpy as np
 import umat
 from fabfem.boundary_value.errors import FIELD, Discretisation, error_columns
 from fabfem.boundary_value.fields import known_fields
+from fabfem.boundary_value.ground import ground_stress, zones_of
 from fabfem.boundary_value.meshes import mesh_of, mesh_place
 from fabfem.boundary_value.omitted import left_out
 from fabfem.boundary_value.probes import Column, columns
-from fabfem.boundary_value.program import Scene, ground_stress, program, zones_of
+from fabfem.boundary_value.program import Scene, program
 from fabfem.boundary_value.water import pore_water
 from fabfem.case import BoundaryValueCase, CaseError, boundaries_of, nearest, suggest, zones_named
 from fabfem.case.materials import ChangHicher

@@ -4,25 +4,23 @@ In a case, gravity, pressures and tractions stay until a later stage changes the
 """
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
 
 import umat
-from fabfem.boundary_value.water import effective_weights, table_level, weight_at_points
+from fabfem.boundary_value.ground import absent_at_first, zones_of
+from fabfem.boundary_value.water import weight_at_points
 from fabfem.case import BoundaryValueCase, stages
 from fabfem.case.stages import AnyStage, Geostatic, Load, StrengthReduction
 from fabfem.case.stages import Gravity as Weight
-from fabfem.fem.loads import BodyForce, Gravity, Pressure, Traction, k0_stress
+from fabfem.fem.loads import BodyForce, Gravity, Pressure, Traction
 from fabfem.fem.loads import Load as Acting
-from fabfem.fem.mesh import Mesh
 from fabfem.fem.pores import PORE_PRESSURE
 from fabfem.fem.space import Space
 from fabfem.fem.stages import ArcLength, Change, DisplacementControl, Goal, Stage, StrengthSearch
 from fabfem.fem.supports import RigidBody, Support
 from fabfem.substance import Substance
-from umat.mandel import Array
 
 Table = tuple[tuple[float, float], ...]
 
@@ -59,22 +57,6 @@ def program(scene: Scene) -> Iterator[Stage]:
     for said in scene.case.stage:
         stage, now = _stage(scene, said, now)
         yield stage
-
-
-def zones_of(case: BoundaryValueCase, material: str, mesh: Mesh) -> tuple[str, ...]:
-    """Return the zones of the mesh that a material of the case fills at first."""
-    named = case.material[material].zones
-    return tuple(mesh.zones) if named is None else named
-
-
-def absent_at_first(case: BoundaryValueCase) -> frozenset[str]:
-    """Return the zones that are put in place later: those that a stage adds before any removes them."""
-    first: dict[str, bool] = {}
-    for said in case.stage:
-        for key in ("add", "remove"):
-            for zone in (getattr(said, key) or ()) if isinstance(said, Load) else ():
-                first.setdefault(zone, key == "add")
-    return frozenset(zone for zone, added in first.items() if added)
 
 
 def _stage(scene: Scene, said: AnyStage, before: Standing) -> tuple[Stage, Standing]:
@@ -244,62 +226,3 @@ def _moved(said: AnyStage) -> Sequence[Support]:
         for boundary in motion.boundary
         for component, value in motion.components().items()
     ]
-
-
-def ground_stress(case: BoundaryValueCase, space: Space, material: str, zone: str) -> Array:
-    """Return the (n, 6) initial stress of a zone: level ground under its own weight, else what its stage gives or none.
-
-    Raises
-    ------
-    ValueError
-        If zones of different unit weight are not level layers.
-    """
-    points = space.points_of(space.mesh.zone(zone))
-    said = case.stage[0]
-    if not isinstance(said, Geostatic) or zone in absent_at_first(case):
-        return _isotropic(_first_stress(case, zone), len(space.weights[points]))
-    _, top = _heights(space.mesh, zone)
-    surcharge = said.surcharge + _overburden(case, space.mesh, top)
-    above, below = effective_weights(case, material)
-    return k0_stress(space, points, top, above, said.k0, surcharge, table_level(case), below)
-
-
-def _first_stress(case: BoundaryValueCase, zone: str) -> float:
-    """Return the mean stress that a zone begins with."""
-    for said in case.stage:
-        if isinstance(said, Load) and zone in (said.add or ()):
-            return said.initial_stress
-    return case.stage[0].initial_stress if isinstance(case.stage[0], Weight) else 0.0
-
-
-def _isotropic(pressure: float, count: int) -> Array:
-    stress = np.zeros((count, 6))
-    stress[:, :3] = pressure
-    return stress
-
-
-def _overburden(case: BoundaryValueCase, mesh: Mesh, height: float) -> float:
-    """Return the weight per area of the zones above a height."""
-    layers = [
-        (*_heights(mesh, zone), effective_weights(case, name))
-        for name in case.material
-        for zone in zones_of(case, name, mesh)
-        if zone not in absent_at_first(case)
-    ]
-    table = table_level(case)
-    levels = sorted({level for low, high, _ in layers for level in (low, high, min(max(table, low), high))} | {height})
-    total = 0.0
-    for low, high in pairwise(level for level in levels if level >= height):
-        weights = {weight[low < table] for bottom, top, weight in layers if bottom < high and top > low}
-        if len(weights) > 1:
-            raise ValueError(
-                f"zones of different unit weight lie side by side at height {low:g}; turn gravity on in a load stage"
-            )
-        total += (high - low) * max(weights, default=0.0)
-    return total
-
-
-def _heights(mesh: Mesh, zone: str) -> tuple[float, float]:
-    """Return the lowest and the highest level of a zone."""
-    levels = mesh.points[mesh.cells[mesh.zone(zone)], -1]
-    return float(levels.min()), float(levels.max())

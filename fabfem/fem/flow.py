@@ -14,6 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from fabfem.fem.increment import advanced, largest
 from fabfem.fem.linear import norm
 from fabfem.fem.model import Refusal, elastic_tangents
 from fabfem.fem.newton import solve_increment, solved, stiffness_of
@@ -22,9 +23,11 @@ from fabfem.fem.trial import Equilibrium, System, Task, Trial, relative
 EQUILIBRIUM, COLLAPSE, UNDECIDED = "equilibrium", "collapse", "undecided"
 STEADY = 0.5
 """Share of the viscous forces that the last doubling of the displacement must leave in a failure."""
-DOUBLINGS = 60
+STEPS = 60
 HALVINGS = 8
-"""Longest sequence of increments of a flow, and how often one is halved where it has no answer."""
+"""Increments of a flow at most, and how often one is halved where it has no answer."""
+PATIENCE = 3
+"""Increments after a halving before the size is doubled again."""
 
 
 class Flow(NamedTuple):
@@ -46,19 +49,20 @@ class Flow(NamedTuple):
 def flow(system: System, now: Equilibrium, load: np.ndarray, enough: float) -> Flow:
     """What becomes of a body under `load` (ndof,) when it may move by more than `enough` [length]."""
     slow = system._replace(controls=replace(system.controls, viscosity=1.0, extrapolate=False))
-    start, drags, size, iterations, halvings = now, [(0.0, np.inf)], 1.0, 0, 0
+    start, drags, size, iterations, halvings, patience = now, [(0.0, np.inf)], 1.0, 0, 0, 0
+    why = ""
     reached = Flow(UNDECIDED, "", now, now, None, 1.0, 0.0, 0)
-    while len(drags) <= DOUBLINGS and halvings <= HALVINGS:
+    while len(drags) <= STEPS and halvings <= HALVINGS:
         answer = solve_increment(slow, now, load, size)
         iterations += answer.iterations
         trial = answer.end
         if isinstance(trial, Refusal):
-            size, halvings, why = 0.5 * size, halvings + 1, trial.reason
+            size, halvings, patience, why = 0.5 * size, halvings + 1, PATIENCE, trial.reason
             continue
-        old, now = now, flowed(now, trial)
+        old, now = now, advanced(now, trial)
         drag, moved = (
             relative(norm(trial.drag), trial.force, load),
-            _largest(system, now.displacement - start.displacement),
+            largest(system, now.displacement - start.displacement),
         )
         reached = Flow(UNDECIDED, "", old, now, trial, drag, moved, iterations)
         if drag <= system.controls.tolerance:
@@ -70,14 +74,10 @@ def flow(system: System, now: Equilibrium, load: np.ndarray, enough: float) -> F
             )
             return reached._replace(verdict=COLLAPSE, reason=reason)
         drags.append((moved, drag))
-        size *= 2.0
+        halvings, patience = 0, max(patience - 1, 0)
+        size *= 1.0 if patience else 2.0
     reason = f"no equilibrium was found, nor a steady flow after a displacement of {reached.moved:.3g}"
     return reached._replace(reason=f"{reason} ({why})" if halvings > HALVINGS else reason)
-
-
-def flowed(old: Equilibrium, trial: Trial) -> Equilibrium:
-    """The state that a viscous increment ends in; its internal force is that of the stress alone."""
-    return Equilibrium(old.displacement + trial.step, trial.batch.states, trial.skeleton, trial.batch.tangent)
 
 
 def elastic_displacement(system: System, now: Equilibrium, load: np.ndarray) -> float:
@@ -85,13 +85,9 @@ def elastic_displacement(system: System, now: Equilibrium, load: np.ndarray) -> 
     tangent = elastic_tangents(system.zones, now.states, system.space.npoints)
     task = Task(load, np.zeros(len(load)), None)
     answer = solved(system, stiffness_of(system, task, tangent), system.constraints.collect(load))
-    return np.inf if isinstance(answer, Refusal) else _largest(system, system.constraints.spread(answer))
+    return np.inf if isinstance(answer, Refusal) else largest(system, system.constraints.spread(answer))
 
 
 def _drag_at(drags: list[tuple[float, float]], moved: float) -> float:
     """The viscous forces when the displacement was last at most `moved`."""
     return next(drag for at, drag in reversed(drags) if at <= moved)
-
-
-def _largest(system: System, displacement: np.ndarray) -> float:
-    return float(np.linalg.norm(system.space.displacement(displacement), axis=1).max())

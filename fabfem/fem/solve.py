@@ -27,9 +27,10 @@ from fabfem.fem.loads import Loading, loading
 from fabfem.fem.model import Controls, Model, Refusal, Zone, elastic_tangents, stress_of, symmetric, weaken
 from fabfem.fem.newton import solve_increment
 from fabfem.fem.pores import Pace, PorousSpace, Water, water_of
+from fabfem.fem.reduction import reduction
 from fabfem.fem.space import Space
 from fabfem.fem.stages import ArcLength, DisplacementControl, Stage, StrengthSearch
-from fabfem.fem.supports import constrain, reduction
+from fabfem.fem.supports import constrain
 from fabfem.fem.trial import PHASES, Equilibrium, System, Trial
 from fabfem.timing import Timer
 

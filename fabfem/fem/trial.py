@@ -14,8 +14,9 @@ from fabfem.fem.assembly import Pattern
 from fabfem.fem.linear import LinearSolver, norm
 from fabfem.fem.model import Batch, Controls, Refusal, States, Zone, elastic_tangents, update_points
 from fabfem.fem.pores import Water
+from fabfem.fem.reduction import Reduction
 from fabfem.fem.space import Space
-from fabfem.fem.supports import Constraints, Reduction
+from fabfem.fem.supports import Constraints
 from fabfem.timing import Timer
 
 PHASES = ("material", "assembly", "linear_solve")

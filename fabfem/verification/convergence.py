@@ -18,8 +18,9 @@ from fabfem.fem.elements import ELEMENTS
 from fabfem.fem.kinematics import KINEMATICS, Kinematics
 from fabfem.fem.linear import make_solver
 from fabfem.fem.mesh import Mesh, quadratic
+from fabfem.fem.reduction import reduction
 from fabfem.fem.space import Space, build_space
-from fabfem.fem.supports import Constraints, reduction
+from fabfem.fem.supports import Constraints
 from fabfem.verification.row import Row
 from umat import Elastic, elastic_tangent, initial_state
 from umat.elastic import bulk_modulus, shear_modulus
