@@ -35,7 +35,7 @@ from .legs import (
     triaxial,
     undrained,
 )
-from .mandel import Array
+from .mandel import Array, norm
 from .step import Course
 from .walk import BEYOND, DONE, REFUSED, RUNNING, WATCHED, Controls, Moment, Walk, Watch, Way, step
 
@@ -102,7 +102,7 @@ def march(
 ) -> Iterator[Moment]:
     """Yield the `Moment` at the start of a leg and at each of `records` equal fractions, until every point has ended.
 
-    A point that is led by its strain is recorded after each of its steps.
+    A point that is led by its strain is recorded after each of its steps, and before it within long strains.
 
     Parameters
     ----------
@@ -125,19 +125,26 @@ def march(
     way = Way(material, directions, _checked(leg, len(state.stress)), course, controls, records, watch)
     walk = Walk(material, state, min(1.0 / records, controls.largest))
     yield walk.moment()
-    record = 0
+    record, before = 1, walk.moment()
     while (walk.ended == RUNNING).any():
-        record += 1
         fraction = min(record / records, 1.0)
-        before = walk.steps.copy()
-        while (ids := _behind(walk, fraction, before)).size:
+        while (ids := _behind(way, walk, fraction, before)).size:
             step(way, walk, ids, fraction)
-        yield walk.moment()
+        before = walk.moment()
+        record += not ((walk.ended == RUNNING) & ~walk.led & (walk.reached < fraction)).any()
+        yield before
 
 
-def _behind(walk: Walk, fraction: float, before: NDArray[np.int64]) -> NDArray[np.intp]:
-    """Return the points that go on before the next record: to its fraction, or by one step where strain leads."""
-    waiting = np.where(walk.led, walk.steps == before, walk.reached < fraction)
+def _behind(way: Way, walk: Walk, fraction: float, before: Moment) -> NDArray[np.intp]:
+    """Return the points that go on before the next record.
+
+    They go to its fraction, or by one step where strain leads or soon will: by a long step of the strain that it may
+    lead, without which the curve would have no records near its peak.
+    """
+    longest = way.controls.beyond / way.records if way.controls.beyond else np.inf
+    driven = ((norm(way.leg.on_stress) > 0.0) & (way.leg.value != 0.0)).any(axis=1)
+    near = ~driven | (norm(walk.strain - before.strain) < longest)
+    waiting = np.where(walk.led, walk.steps == before.steps, (walk.reached < fraction) & near)
     return np.flatnonzero((walk.ended == RUNNING) & waiting)
 
 

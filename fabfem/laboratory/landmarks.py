@@ -1,8 +1,8 @@
 """States of a test that have names: instability, phase transformation, characteristic, peak and critical state.
 
-Found among the rows of a stage, up to its first reversal, each at the vertex of the parabola through the three rows around an extremum, over the
-path length of strain; whatever else is said of the state is interpolated between the rows on either side. An extremum
-counts where the curve comes back from it by more than `NOTICED` of its largest value in the stage.
+Found among the rows of a stage up to its first reversal, each at the vertex of the parabola through the three rows
+around an extremum, over the path length of strain; whatever else is said of the state is interpolated between the rows
+on either side. An extremum counts where the curve comes back from it by more than `NOTICED` of its largest value.
 
 * Instability, at constant volume: the first maximum of q that is followed by a fall.
 * Phase transformation, at constant volume: the first minimum of p that is followed by a rise.

@@ -24,7 +24,7 @@ HEADERS = (
     "increment [-]",
     "eps_q [-]",
     "angle [deg]",
-    "density 4 pi E [-]",
+    "4 pi E [-]",
     "f_n / mean [-]",
     "f_t / f_n [-]",
 )

@@ -106,6 +106,7 @@ def _why(specimen: Specimen, stage: Path, moment: Moment) -> tuple[str, str]:
         )
     if moment.ended[0] == REFUSED:
         code = int(moment.code[0])
-        cause = status.message(code) if code else "no strain meets the conditions with this set of directions"
-        return "stopped", f"{at}: {cause.rstrip('.')}"
+        cause = status.message(code) if code else "no strain increment, however small, meets the six conditions"
+        hint = "" if code or specimen.directions is None else "; a finer rule of directions may"
+        return "stopped", f"{at}: {cause.rstrip('.')}{hint}"
     return "liquefied", f"the mean effective stress fell to {pressure:.3g} {unit} {at}"
