@@ -30,6 +30,7 @@ PASSED = ("STRESS", "STATEV", "DDSDDE", "DSTRAN", "NTENS", "NSTATV", "PROPS", "N
 INTEGERS = ("NTENS", "NSTATV", "NPROPS")
 REDUCTION = 0.5
 """Factor on PNEWDT of a refused point."""
+RELEASE = "NRT_MemInfo_call_dtor"
 LINKERS = ("cc", "gcc", "clang")
 BYTE, WORD, LONG, REAL = ir.IntType(8), ir.IntType(32), ir.IntType(64), ir.DoubleType()
 
@@ -102,6 +103,7 @@ def _entry_code(compiled: Any, entry: EntryPoint, layout: Layout, beside: Any) -
             _store_nan(builder, places["STRESS"])
             _complain(builder, module, code, told, layout)
     builder.ret_void()
+    _without_counts(module, beside)
     return str(module)
 
 
@@ -115,6 +117,16 @@ def _call(builder: Any, module: Any, compiled: Any, arguments: list[Any]) -> Any
     places = [result, trouble, *arguments]
     builder.call(function, [builder.bitcast(place, to) for place, to in zip(places, kind.args, strict=True)])
     return builder.load(result)
+
+
+def _without_counts(module: Any, beside: Any) -> None:
+    """Define what numba calls when the last reference to an array goes: arrays in the block have no references."""
+    foreign = {part.name for part in beside.functions if part.is_declaration and part.name.startswith("NRT_")}
+    if foreign - {RELEASE}:
+        raise ValueError(f"the kernels allocate memory, which a library cannot: {', '.join(sorted(foreign))}")
+    if foreign:
+        release = ir.Function(module, ir.FunctionType(ir.VoidType(), [BYTE.as_pointer()]), RELEASE)
+        ir.IRBuilder(release.append_basic_block()).ret_void()
 
 
 def _memory(module: Any, contents: bytearray) -> Any:

@@ -59,7 +59,7 @@ def sliding(constants, rule, stress, fabric, void_ratio, slip, force):
 
     f = σ G⁻¹ n / c(e); λ = f_n^½ R R_p / ((R_p − R) 2 k_pR) compliance with R_p = (e_c/e) tan φ_μ.
     """
-    g, s, z = inverse(fabric), square(stress, 1.0), (0.0, 0.0, 0.0)
+    g, s = inverse(fabric), square(stress, 1.0)
     compliance, _, ease_p = constants.elastic
     e_ref, slope, exponent = constants.line
     density = 3.0 / (2.0 * math.pi) * (13.28 - 8.0 * void_ratio) / (1.0 + void_ratio)
@@ -75,7 +75,7 @@ def sliding(constants, rule, stress, fabric, void_ratio, slip, force):
         if not (normal > 0.0 and ratio < limit):
             return OUTSIDE
         slip[a] = ease_p * compliance * math.sqrt(normal) * limit * ratio / (limit - ratio)
-        for i in range(force.shape[1]):
+        if a < force.shape[0]:
             force[a, 0], force[a, 1], force[a, 2] = f
     return 0
 
