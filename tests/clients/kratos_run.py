@@ -1,9 +1,9 @@
 """Solve a scene in Kratos Multiphysics with a compiled UMAT: `python kratos_run.py SCENE.json RESULT.csv`.
 
 Needs the packages KratosGeoMechanicsApplication and KratosLinearSolversApplication and nothing of this repository.
-The scene says nodes, elements, law, properties, initial stress, what is fixed, forces and the nodes that are driven;
-the result has a line for each increment, with the displacement and the force of the driven nodes. Elements are those
-of small displacement, law `SmallStrainUMAT3DLaw` or `SmallStrainUMAT2DPlaneStrainLaw`, which loads the library.
+The scene says nodes, hexahedra, properties, initial stress, what is fixed, forces and the nodes that are driven; the
+result has a line for each increment, with the displacement and the force of the driven nodes. The law
+`SmallStrainUMAT3DLaw` loads the library; it orders shears 12, 23, 13, so that scenes must have none out of a plane.
 """
 
 import csv
@@ -20,31 +20,30 @@ DISPLACEMENTS = {"x": Kratos.DISPLACEMENT_X, "y": Kratos.DISPLACEMENT_Y, "z": Kr
 REACTIONS = {"x": Kratos.REACTION_X, "y": Kratos.REACTION_Y, "z": Kratos.REACTION_Z}
 LOADS = {"x": Structural.POINT_LOAD_X, "y": Structural.POINT_LOAD_Y, "z": Structural.POINT_LOAD_Z}
 named = Kratos.KratosGlobals.GetVariable
-LOAD_CONDITION = {2: "PointLoadCondition2D1N", 3: "PointLoadCondition3D1N"}
+LAW, ELEMENT, LOAD = "SmallStrainUMAT3DLaw", "SmallDisplacementElement3D8N", "PointLoadCondition3D1N"
 
 
 def model_part(model: Any, scene: dict[str, Any]) -> Any:
     """Return the mesh with material, forces and fixities."""
     part = model.CreateModelPart("soil", 2)
-    part.ProcessInfo[Kratos.DOMAIN_SIZE] = scene["dim"]
+    part.ProcessInfo[Kratos.DOMAIN_SIZE] = 3
     for variable in (Kratos.DISPLACEMENT, Kratos.REACTION, Structural.POINT_LOAD, Kratos.VOLUME_ACCELERATION):
         part.AddNodalSolutionStepVariable(variable)
     for number, place in enumerate(scene["nodes"], 1):
-        part.CreateNewNode(number, *place, *[0.0] * (3 - scene["dim"]))
+        part.CreateNewNode(number, *place)
     properties = part.GetProperties()[1]
-    properties[Kratos.CONSTITUTIVE_LAW] = Kratos.KratosGlobals.GetConstitutiveLaw(scene["law"]).Clone()
+    properties[Kratos.CONSTITUTIVE_LAW] = Kratos.KratosGlobals.GetConstitutiveLaw(LAW).Clone()
     properties[named("UDSM_NAME")], properties[named("IS_FORTRAN_UDSM")] = scene["library"], True
     properties[named("UMAT_PARAMETERS")] = Kratos.Vector(scene["properties"])
     properties[named("STATE_VARIABLES")] = Kratos.Vector([0.0] * scene["state_variables"])
     properties[Kratos.DENSITY], properties[Kratos.THICKNESS] = 0.0, 1.0
     for number, nodes in enumerate(scene["elements"], 1):
-        part.CreateNewElement(scene["element"], number, [node + 1 for node in nodes], properties)
-    axes = "xyz"[: scene["dim"]]
-    for axis in axes:
+        part.CreateNewElement(ELEMENT, number, [node + 1 for node in nodes], properties)
+    for axis in "xyz":
         Kratos.VariableUtils().AddDof(DISPLACEMENTS[axis], REACTIONS[axis], part)
     for number, (node, force) in enumerate(scene["forces"], 1):
-        part.CreateNewCondition(LOAD_CONDITION[scene["dim"]], number, [node + 1], properties)
-        for axis, value in zip(axes, force, strict=True):
+        part.CreateNewCondition(LOAD, number, [node + 1], properties)
+        for axis, value in zip("xyz", force, strict=True):
             part.Nodes[node + 1].SetSolutionStepValue(LOADS[axis], value)
     for node, axis in scene["fixed"]:
         part.Nodes[node + 1].Fix(DISPLACEMENTS[axis])
