@@ -1,7 +1,7 @@
 """The ``fabfem`` command.
 
-Exit status: 0 done, 1 the pictures could not be drawn, 2 bad input, 3 a run that could not go on (all that converged
-is kept), 130 interrupted. Nothing heavy is imported before a command needs it.
+Exit status: 0 done, 1 the pictures could not be drawn or an answer of the verification is wrong, 2 bad input, 3 a run
+that could not go on (all that converged is kept), 130 interrupted. Nothing heavy is imported before a command needs it.
 """
 
 import argparse
@@ -11,7 +11,7 @@ from pathlib import Path
 
 from fabfem import __version__
 
-DONE, NO_PICTURE, BAD_INPUT, STOPPED, INTERRUPTED = 0, 1, 2, 3, 130
+DONE, NO_PICTURE, RED, BAD_INPUT, STOPPED, INTERRUPTED = 0, 1, 1, 2, 3, 130
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -50,12 +50,15 @@ def _fail(message: str, status: int) -> int:
 
 
 def _solve(options: argparse.Namespace) -> int:
-    from fabfem.run import run_case
+    from fabfem.case import read_case
+    from fabfem.run import remember_cost, run_case
 
-    outcome = run_case(options.case, options.out or Path("results") / options.case.stem, quiet=options.quiet)
+    case = read_case(options.case)
+    outcome = run_case(case, options.out or Path("results") / options.case.stem, quiet=options.quiet)
     if not options.quiet:
         print(outcome.summary())
     if outcome.status == "completed":
+        remember_cost(case, outcome.folder)
         return DONE
     return _fail(outcome.reason, INTERRUPTED if outcome.status == "interrupted" else STOPPED)
 
@@ -63,15 +66,59 @@ def _solve(options: argparse.Namespace) -> int:
 def _check(options: argparse.Namespace) -> int:
     from fabfem.case import read_case, resolved
     from fabfem.output.progress import summary
-    from fabfem.run import describe_case
+    from fabfem.run import describe_case, price_case
 
     case = read_case(options.case)
     description = describe_case(case)
     if not options.quiet:
         print(resolved(case))
         print("# What the scene leaves out:", *description.omitted, sep="\n#   ")
-        print("# What remains:\n" + summary(description.remains, prefix="#   "))
+        cost = price_case(case) if options.price else ""
+        remains = (*description.remains, *([("time", cost)] if cost else []))
+        print("# What remains:\n" + summary(remains, prefix="#   "))
     return DONE
+
+
+def _sweep(options: argparse.Namespace) -> int:
+    from fabfem.study.sweep import sweep
+
+    swept = sweep(options.case, _folder(options, "sweep"), options.quiet)
+    if not options.quiet:
+        print(f"{swept.completed} of {swept.runs} runs completed\n  {swept.table}")
+    return DONE if swept.completed == swept.runs else STOPPED
+
+
+def _study(options: argparse.Namespace) -> int:
+    from fabfem.pictures.work_precision import draw
+    from fabfem.study.work_precision import study
+
+    try:
+        found = study(options.case, _folder(options, "study"), options.quiet)
+    except KeyboardInterrupt:
+        return _fail("interrupted; runs that ended are kept, and the same command goes on from there", INTERRUPTED)
+    picture = draw(found.folder)
+    if not options.quiet:
+        print(*found.sentences, f"  {found.folder / 'study.csv'}", f"  {picture}", sep="\n")
+    return DONE
+
+
+def _calibrate(options: argparse.Namespace) -> int:
+    from fabfem.pictures.calibration import draw
+    from fabfem.study.calibrate import calibrate
+
+    try:
+        found = calibrate(options.case, _folder(options, "calibrate"), options.quiet)
+    except KeyboardInterrupt:
+        return _fail("interrupted; runs that ended are kept, and the same command goes on from there", INTERRUPTED)
+    picture = draw(found.folder)
+    if not options.quiet:
+        print(*found.sentences, f"  {found.folder / 'calibration.json'}", f"  {picture}", sep="\n")
+    return DONE
+
+
+def _folder(options: argparse.Namespace, what: str) -> Path:
+    """Return where the results of many runs of a case go."""
+    return options.out or Path("results") / f"{options.case.stem}_{what}"
 
 
 def _show(options: argparse.Namespace) -> int:
@@ -81,6 +128,13 @@ def _show(options: argparse.Namespace) -> int:
     if not options.quiet:
         print("\n".join(str(picture) for picture in shown.pictures))
     return _fail(shown.trouble, NO_PICTURE) if shown.trouble else DONE
+
+
+def _verify(options: argparse.Namespace) -> int:
+    from fabfem.verification.problems import chosen
+    from fabfem.verification.report import verify
+
+    return DONE if verify(chosen(options.only), options.json, options.quiet) else RED
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -100,9 +154,28 @@ def _parser() -> argparse.ArgumentParser:
 
     check = commands.add_parser("check", parents=[common], help="validate a case and say what its scene leaves out")
     check.add_argument("case", type=Path, metavar="CASE.toml")
+    check.add_argument("--price", action="store_true", help="predict the time; the first of its kind runs for 10 s")
     check.set_defaults(command=_check)
+
+    many = {
+        "sweep": (_sweep, "run a case with the product of some parameters"),
+        "study": (_study, "error against run time for the settings of a case"),
+        "calibrate": (_calibrate, "fit parameters of a case to measured curves"),
+    }
+    for name, (command, what) in many.items():
+        runs = commands.add_parser(name, parents=[common], help=what)
+        runs.add_argument("case", type=Path, metavar="CASE.toml")
+        runs.add_argument(
+            "--out", type=Path, metavar="DIR", help=f"folder of the results (default: results/CASE_{name})"
+        )
+        runs.set_defaults(command=command)
 
     show = commands.add_parser("show", parents=[common], help="draw pictures of a result")
     show.add_argument("folder", type=Path, metavar="DIR")
     show.set_defaults(command=_show)
+
+    verify = commands.add_parser("verify", parents=[common], help="run problems with known answers and compare")
+    verify.add_argument("--only", action="append", default=[], metavar="NAME", help="a problem; may be given again")
+    verify.add_argument("--json", action="store_true", help="print the rows as JSON")
+    verify.set_defaults(command=_verify)
     return parser

@@ -7,7 +7,11 @@ from typing import Any
 from fabfem.case import Case, read_case
 from fabfem.outcome import Description, Outcome
 
-SCENES = {"boundary_value": "fabfem.boundary_value.run"}
+SCENES = {
+    "boundary_value": "fabfem.boundary_value.run",
+    "element": "fabfem.laboratory.run",
+    "fabric": "fabfem.fabric_tests.run",
+}
 """Module that runs each kind of scene; it has `describe(case)` and `run(case, folder, quiet)`."""
 
 
@@ -41,6 +45,25 @@ def describe_case(case: Case) -> Description:
         If the case cannot be run.
     """
     return _scene(case).describe(case)
+
+
+def price_case(case: Case) -> str:
+    """Return what a run of a case will cost in time, in words; nothing where its kind of scene cannot tell.
+
+    Raises
+    ------
+    CaseError
+        If the case cannot be run.
+    """
+    scene = _scene(case)
+    return scene.price(case) if hasattr(scene, "price") else ""
+
+
+def remember_cost(case: Case, folder: Path) -> None:
+    """Keep what the completed run in a folder has cost, for the price of the next one of its kind."""
+    scene = _scene(case)
+    if hasattr(scene, "remember"):
+        scene.remember(case, folder)
 
 
 def _scene(case: Case) -> Any:

@@ -147,8 +147,8 @@ def _sand(table: said.ChangHicher, units: Units) -> Any:
     if table.preset not in SANDS:
         raise MisfitError("preset", f"there is no sand '{table.preset}'{suggest(table.preset, SANDS)}")
     sand = SANDS[table.preset](newtons=units.newtons, metres=units.metres)
-    changed = _changed(sand, table.parameters, "parameters")
-    return changed._replace(law=_law(table.fabric, sand.law), localisation=table.localisation)
+    sand_as_said = changed(sand, table.parameters, "parameters")
+    return sand_as_said._replace(law=_law(table.fabric, sand.law), localisation=table.localisation)
 
 
 def _law(fabric: said.Fabric | None, preset: Any) -> Any:
@@ -159,11 +159,11 @@ def _law(fabric: said.Fabric | None, preset: Any) -> Any:
     if fabric.law not in known:
         raise MisfitError("fabric.law", f"there is no fabric law '{fabric.law}'{suggest(fabric.law, known)}")
     record = known[fabric.law]
-    return _changed(preset if isinstance(preset, record) else record(), fabric.parameters, "fabric.parameters")
+    return changed(preset if isinstance(preset, record) else record(), fabric.parameters, "fabric.parameters")
 
 
-def _changed(record: Any, parameters: Mapping[str, float], place: str) -> Any:
-    """Return a record with some parameters replaced."""
+def changed(record: Any, parameters: Mapping[str, float], place: str) -> Any:
+    """Return a record with some parameters replaced; `MisfitError` with the place of one that it does not have."""
     numbers = [name for name, value in record._asdict().items() if isinstance(value, int | float)]
     for name in parameters:
         if name not in numbers:

@@ -16,6 +16,7 @@ from umat.interface import (
     state_fields,
     symmetric_tangent,
     update,
+    weakened,
 )
 from umat.threads import set_threads
 
@@ -34,6 +35,7 @@ __all__ = [
     "state_fields",
     "symmetric_tangent",
     "update",
+    "weakened",
 ]
 
 _HOMES = {

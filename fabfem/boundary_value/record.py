@@ -4,11 +4,15 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+from fabfem.boundary_value.audit import audit, audited
 from fabfem.boundary_value.fields import QUANTITIES
 from fabfem.boundary_value.frame import frame
 from fabfem.boundary_value.omitted import remaining
+from fabfem.boundary_value.peaks import Peaks
 from fabfem.boundary_value.problem import Problem
-from fabfem.fem.solve import Cutback, Increment
+from fabfem.boundary_value.safety import safety, write_curve
+from fabfem.boundary_value.stability import localisation
+from fabfem.fem.increment import Collapsed, Cutback, Increment
 from fabfem.output.history import History
 from fabfem.output.report import Report
 from fabfem.output.vtu import FieldFiles
@@ -28,6 +32,7 @@ class Recorder:
         self.report = Report(folder / "report.json", **_head(problem))
         self.fields = _field_files(problem, folder)
         self.row: tuple[Any, ...] = ()
+        self._peaks = Peaks(problem.columns)
         self._stored = 0
         self._last: Increment | None = None
 
@@ -42,9 +47,26 @@ class Recorder:
             if output and (increment.number % output.every == 0 or increment.fraction >= 1.0):
                 self._store()
             self.report.add(_entry(increment), map(asdict, increment.cutbacks))
+            self._peaks.add(increment, self.row)
+            self.report.content["peaks"] = self._peaks.content()
             if increment.worst_error > 0.0:
                 self.report.worst(_place(self.problem, increment))
+            if audited(self.problem, increment):
+                self.report.content["audit"] = audit(self.problem, increment)
+            if output and "acoustic_determinant" in output.fields and "localisation" not in self.report.content:
+                self.report.content.update(localisation(self.problem.model.space, increment))
         self._write_report()
+
+    def failed(self, end: Collapsed) -> None:
+        """Write how a search for the factor of safety ended: its bracket, its curve and its mechanism."""
+        self.timer.add(end.timings)
+        with self.timer.phase("output"):
+            self._store()
+            self.report.content["factor_of_safety"] = safety(end)
+            self.report.content["cutbacks"].extend(map(asdict, end.cutbacks))
+            write_curve(self.folder / "strength_reduction.csv", end, self.problem.case.units.length)
+            if self.fields and end.failing and self.problem.case.output:
+                self.fields.write(frame(self.problem, self.problem.case.output, end.failing))
 
     def end(self, status: str, reason: str, cutbacks: tuple[Cutback, ...] = ()) -> tuple[str, str]:
         """Store the fields of the last increment, say how the run ended, close, and return status and reason."""
@@ -69,7 +91,7 @@ class Recorder:
 def _head(problem: Problem) -> dict[str, Any]:
     """Return what a report says before anything has run."""
     case, units = problem.case, problem.case.unit_system
-    kinds = ("probe", "reaction", "derived")
+    kinds = ("probe", "reaction", "derived", "error")
     fields = case.output.fields if case.output else ()
     return {
         "case": case.path.name,
@@ -86,7 +108,7 @@ def _head(problem: Problem) -> dict[str, Any]:
 def _entry(increment: Increment) -> dict[str, Any]:
     """Return what a report keeps of an increment."""
     kept = ("stage", "number", "fraction", "size", "time", "iterations", "residuals", "out_of_balance")
-    found = {name: getattr(increment, name) for name in (*kept, "drag", "held", "moved")}
+    found = {name: getattr(increment, name) for name in (*kept, "drag", "held", "moved", "strength", "load_factor")}
     return found | {"cutbacks": len(increment.cutbacks)}
 
 
@@ -112,6 +134,6 @@ def _field_files(problem: Problem, folder: Path) -> FieldFiles | None:
 
 def _clear(folder: Path) -> None:
     """Remove the results and pictures of an earlier run."""
-    for pattern in ("fields_*.vtu", "fields.pvd", "history.csv", "report.json", "*.png"):
+    for pattern in ("fields_*.vtu", "fields.pvd", "history.csv", "report.json", "strength_reduction.csv", "*.png"):
         for file in folder.glob(pattern):
             file.unlink()

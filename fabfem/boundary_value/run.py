@@ -1,14 +1,21 @@
 """A boundary-value run from the case to the last row: march the problem, write what converges, say how it ended."""
 
+import json
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
-from fabfem.boundary_value.omitted import remaining
+from fabfem.boundary_value.audit import audited
+from fabfem.boundary_value.omitted import memory, remaining
+from fabfem.boundary_value.price import price as price_of
+from fabfem.boundary_value.price import remember as remember_run
 from fabfem.boundary_value.problem import Problem, build
 from fabfem.boundary_value.record import PHASES, Recorder
+from fabfem.boundary_value.safety import sentence
 from fabfem.case import BoundaryValueCase
-from fabfem.case.stages import Geostatic
-from fabfem.fem.solve import Increment, Stopped, march
+from fabfem.fem.flow import UNDECIDED
+from fabfem.fem.increment import Collapsed, Increment, Stopped
+from fabfem.fem.solve import march
 from fabfem.outcome import Description, Outcome, make_folder, short
 from fabfem.output.interrupt import held_back
 from fabfem.output.progress import Quiet, Terminal
@@ -24,7 +31,25 @@ def describe(case: BoundaryValueCase) -> Description:
         If the case cannot be run.
     """
     problem = build(case)
-    return Description(problem.omitted, tuple(remaining(problem.model)))
+    return Description(problem.omitted, tuple(remaining(problem.model)), memory(problem.model))
+
+
+def price(case: BoundaryValueCase) -> str:
+    """Return what a run of a case will cost, in a sentence; `CaseError` if it cannot be run."""
+    cost = price_of(build(case))
+    return f"about {_duration(cost.seconds)}, judged by {cost.source}"
+
+
+def remember(case: BoundaryValueCase, folder: Path) -> None:
+    """Keep what a completed run has cost, for the price of the next one of its kind."""
+    remember_run(build(case), json.loads((folder / "report.json").read_text(encoding="utf-8")))
+
+
+def _duration(seconds: float) -> str:
+    """Return a time with the unit that suits it."""
+    if seconds < 120.0:
+        return f"{seconds:.2g} s"
+    return f"{seconds / 60.0:.0f} min" if seconds < 7200.0 else f"{seconds / 3600.0:.1f} h"
 
 
 def run(case: BoundaryValueCase, folder: Path, quiet: bool, timer: Timer | None = None) -> Outcome:
@@ -43,7 +68,7 @@ def run(case: BoundaryValueCase, folder: Path, quiet: bool, timer: Timer | None 
     return Outcome(status, reason, folder, len(recorder.report.content["increments"]), last, timer.total())
 
 
-def _drive(steps: Iterator[Increment | Stopped], recorder: Recorder, shown: Quiet) -> tuple[str, str]:
+def _drive(steps: Iterator[Increment | Stopped | Collapsed], recorder: Recorder, shown: Quiet) -> tuple[str, str]:
     """March to the end and return the status and the reason."""
     case = recorder.problem.case
     try:
@@ -51,10 +76,12 @@ def _drive(steps: Iterator[Increment | Stopped], recorder: Recorder, shown: Quie
             if isinstance(step, Stopped):
                 recorder.timer.add(step.timings)
                 return recorder.end("stopped", _why(step, recorder.problem), step.cutbacks)
+            if isinstance(step, Collapsed):
+                return _found(step, recorder, shown)
             with held_back():
                 recorder.add(step)
-            if isinstance(case.stage[step.stage_index], Geostatic):
-                shown.say(_audit(step, case.units.length))
+            if audited(recorder.problem, step):
+                shown.say(_audit(recorder.report.content["audit"], case.units.length))
             shown.advance(step.stage, step.stage_index + step.fraction, step.number, step.iterations)
     except KeyboardInterrupt:
         return recorder.end("interrupted", "interrupted; all increments that converged are kept")
@@ -63,10 +90,20 @@ def _drive(steps: Iterator[Increment | Stopped], recorder: Recorder, shown: Quie
     return recorder.end("completed", "")
 
 
-def _audit(step: Increment, length: str) -> str:
-    """Return how far the initial state was from equilibrium."""
-    unbalanced = f"out of balance by {step.out_of_balance:.1e} of the forces at work"
-    return f"{step.stage}: {unbalanced}, moved {step.moved:.1e} {length}"
+def _found(end: Collapsed, recorder: Recorder, shown: Quiet) -> tuple[str, str]:
+    """Record the factor of safety and return status and reason."""
+    with held_back():
+        recorder.failed(end)
+    shown.say(sentence(end))
+    if end.last_equilibrium is None or end.verdict == UNDECIDED:
+        return recorder.end("stopped", sentence(end))
+    return recorder.end("completed", "")
+
+
+def _audit(found: dict[str, Any], length: str) -> str:
+    """Return how far the initial state was from equilibrium, and why."""
+    unbalanced = f"out of balance by {found['out_of_balance']:.1e} of the forces at work"
+    return f"{found['stage']}: {unbalanced}, moved {found['moved']:.1e} {length}; {found['why']}"
 
 
 def _why(stopped: Stopped, problem: Problem) -> str:

@@ -4,9 +4,11 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
+from fabfem.case.mesh import Mesh
 from fabfem.case.schema import AnyScene, Case
 from fabfem.case.stages import AnyStage, Component, Support
 from fabfem.case.table import Factors, Identifier, Names, NotNegative, Positive, Table, Text
+from fabfem.case.water import Water
 
 
 class Scene(AnyScene):
@@ -16,15 +18,6 @@ class Scene(AnyScene):
     """Kind of scene."""
     kinematics: Literal["plane_strain", "axisymmetric", "axisymmetric_torsion", "solid"]
     """Displacements that the scene has, and the strains they make."""
-
-
-class Mesh(Table):
-    """The mesh."""
-
-    file: Text
-    """File in any format of meshio, with named boundaries and zones; relative to the case file."""
-    order: Annotated[int, Field(ge=1, le=2)] = 2
-    """Order of the displacement in an element."""
 
 
 class Solver(Table):
@@ -45,18 +38,18 @@ class Solver(Table):
 
 
 class Probe(Table):
-    """A displacement written to the history."""
+    """A displacement, or a pore pressure, written to the history."""
 
     name: Identifier
     """Name of the column."""
-    kind: Literal["displacement"] = "displacement"
+    kind: Literal["displacement", "pore_pressure"] = "displacement"
     """What is probed."""
     boundary: Names | None = None
     """Boundaries over whose nodes the mean is taken."""
     point: Annotated[tuple[float, ...], Field(min_length=2, max_length=3, strict=False)] | None = None
     """Point whose nearest node is taken, instead of a boundary."""
-    component: Component
-    """Component of the displacement."""
+    component: Component | None = None
+    """Component of the displacement; a pore pressure has none."""
     scale: float = 1.0
     """Factor on the value."""
 
@@ -98,6 +91,20 @@ class Output(Table):
     """Smoothed at nodes, raw means in cells, or both."""
 
 
+class Errors(Table):
+    """Estimates of its own error that a run carries, a column of the history each."""
+
+    estimate: Annotated[
+        tuple[Literal["equilibrium", "integration", "discretisation", "directions"], ...],
+        Field(min_length=1, strict=False),
+    ]
+    """What is estimated."""
+    rule: Text = "lebedev_23"
+    """Second rule of contact directions, with which the directions' error is estimated."""
+    samples: Annotated[int, Field(ge=1)] = 16
+    """Points of each zone that go through the second rule."""
+
+
 class BoundaryValueCase(Case):
     """A boundary-value problem as its file states it."""
 
@@ -109,6 +116,8 @@ class BoundaryValueCase(Case):
     """Supports of all stages."""
     stage: Annotated[tuple[AnyStage, ...], Field(min_length=1, strict=False)]
     """Stages, in order."""
+    water: Water | None = None
+    """Water in the pores; a scene without it is dry."""
     solver: Solver = Solver()
     """Solution of the equations."""
     probe: Annotated[tuple[Probe, ...], Field(strict=False)] = ()
@@ -119,3 +128,5 @@ class BoundaryValueCase(Case):
     """Columns made from others."""
     output: Output | None = None
     """Fields to store; none when left out."""
+    errors: Errors | None = None
+    """Errors to estimate; none when left out."""

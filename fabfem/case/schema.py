@@ -6,6 +6,7 @@ from typing import Annotated, Literal
 from pydantic import Field, PrivateAttr
 
 from fabfem.case.materials import AnyMaterial
+from fabfem.case.study import Calibration, Study, Sweep
 from fabfem.case.table import Identifier, Table
 from fabfem.units import FORCES, LENGTHS, Units
 
@@ -37,6 +38,12 @@ class Case(Table):
     """Units of the case."""
     material: Annotated[dict[Identifier, AnyMaterial], Field(min_length=1)]
     """Materials by name."""
+    sweep: Sweep | None = None
+    """Runs of the case with the product of some parameters."""
+    study: Study | None = None
+    """Runs of the case with other settings, for their error and time."""
+    calibration: Calibration | None = None
+    """Runs of the case that fit parameters to measured curves."""
 
     _path: Path = PrivateAttr(Path("case.toml"))
 

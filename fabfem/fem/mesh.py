@@ -129,6 +129,17 @@ def outer_facets(cells: np.ndarray, cell_type: str, nodes: np.ndarray) -> np.nda
     return inside[count[key] == 1]
 
 
+def inner_facets(cells: np.ndarray, cell_type: str) -> tuple[np.ndarray, np.ndarray]:
+    """(n, 2) elements that share a facet, and (n, nfacetnode) its nodes."""
+    element = ELEMENTS[cell_type]
+    facets = _facets(cells, element)
+    corners = np.sort(facets[:, : _ncorner(element)], axis=1)
+    order = np.lexsort(corners.T)
+    twin = np.flatnonzero((corners[order[1:]] == corners[order[:-1]]).all(axis=1))
+    elements = np.stack([order[twin], order[twin + 1]], axis=1) // len(element.facets)
+    return np.sort(elements, axis=1), facets[order[twin]]
+
+
 def _read(path: Path) -> meshio.Mesh:
     """What meshio reads; its prints and its exit become one sentence."""
     if not path.is_file():

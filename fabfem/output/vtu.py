@@ -50,6 +50,8 @@ class Frame(NamedTuple):
     """Fields at nodes, first axis the node."""
     in_cells: Arrays
     """Means in cells, first axis the cell."""
+    points: NDArray[np.float64] | None = None
+    """Places of the nodes where they are not those of the files."""
 
 
 class FieldFiles:
@@ -60,6 +62,7 @@ class FieldFiles:
     ) -> None:
         self.folder = folder
         self.note = note.replace("--", "-")
+        self._cells, self._cell_type = cells, cell_type
         self._geometry = _geometry(points, cells, cell_type)
         self._stored: list[tuple[float, str]] = []
 
@@ -82,7 +85,7 @@ class FieldFiles:
         yield _array("TimeValue", np.array([frame.time]), tuples=True)
         yield _array("compression_positive", np.array([1], dtype=np.int32), tuples=True)
         yield "</FieldData>"
-        yield self._geometry
+        yield self._geometry if frame.points is None else _geometry(frame.points, self._cells, self._cell_type)
         for place, fields in (("PointData", frame.at_nodes), ("CellData", frame.in_cells)):
             yield f"<{place}>"
             yield from (_array(name, np.asarray(values, dtype=np.float32)) for name, values in fields.items())

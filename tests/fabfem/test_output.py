@@ -195,6 +195,5 @@ def test_fields_that_nobody_asks_for_cost_nothing(folder: Path, monkeypatch: pyt
         raise AssertionError("the state was asked for fields that nobody wants")
 
     monkeypatch.setattr("umat.state_fields", refuse)
-    zones = problem.model.zones
-    gathered = point_fields(problem.model.space, zones, step.displacement, step.states, ("p", "displacement"))
+    gathered = point_fields(problem.model.space, step, ("p", "displacement"))
     assert list(gathered) == ["p"]

@@ -1,0 +1,37 @@
+"""The picture of a calibration: what was measured beside what the fitted case answers, a panel for each curve."""
+
+import csv
+from pathlib import Path
+from typing import Any
+
+from fabfem.pictures.work_precision import COLOURS
+
+
+def draw(folder: Path) -> Path:
+    """Draw ``calibration.png`` from the ``calibration_curves.csv`` of a folder and return its file."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    with (folder / "calibration_curves.csv").open(encoding="utf-8") as file:
+        header, *rows = list(csv.reader(file))
+    curves = [name.removesuffix(" measured") for name in header[2::2]]
+    figure = Figure(figsize=(6.0 * len(curves), 5.0), layout="constrained")
+    for number, (axes, name) in enumerate(zip(figure.subplots(1, len(curves), squeeze=False)[0], curves, strict=True)):
+        _panel(axes, rows, 2 + 2 * number)
+        axes.set(xlabel=header[1].replace("_", " "), ylabel=name.replace("_", " "))
+    FigureCanvasAgg(figure)
+    figure.savefig(folder / "calibration.png", dpi=130)
+    return folder / "calibration.png"
+
+
+def _panel(axes: Any, rows: list[list[str]], column: int) -> None:
+    """Draw a curve of all tests, measured as points and answered as lines."""
+    for number, test in enumerate(dict.fromkeys(row[0] for row in rows)):
+        mine = [row for row in rows if row[0] == test]
+        along, measured, answered = ([float(row[i]) for row in mine] for i in (1, column, column + 1))
+        colour = COLOURS[number % len(COLOURS)]
+        axes.plot(along, measured, "o", color=colour, markersize=4, label=f"{test}, measured")
+        axes.plot(along, answered, color=colour, linewidth=1.5, label=f"{test}, case")
+    axes.grid(alpha=0.25)
+    axes.spines[["top", "right"]].set_visible(False)
+    axes.legend(fontsize=8)
