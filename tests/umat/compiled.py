@@ -10,12 +10,13 @@ ROUTINES = Path(__file__).parent / "routines"
 COMPILERS = {".c": ("gcc", "cc", "clang"), ".f": ("gfortran",)}
 
 
-def compiled(name: str, folder: Path) -> str:
-    """Return the library of a routine, compiled into a folder; skip the test where there is no compiler."""
+def compiled(name: str, folder: Path, *options: str, shared: bool = True) -> str:
+    """Return the library, or program, of a source, compiled into a folder; skip the test if there is no compiler."""
     source = ROUTINES / name
     known = [found for compiler in COMPILERS[source.suffix] if (found := shutil.which(compiler))]
     if not known:
         pytest.skip(f"none of {', '.join(COMPILERS[source.suffix])} is installed to compile {name}")
-    library = folder / f"{source.stem}.so"
-    subprocess.run([known[0], "-O2", "-shared", "-fPIC", "-o", str(library), str(source), "-lm"], check=True)
+    library = folder / f"{source.stem}{'.so' if shared else ''}"
+    kind = ["-shared", "-fPIC"] if shared else []
+    subprocess.run([known[0], "-O2", *kind, "-o", str(library), str(source), "-lm", *options], check=True)
     return str(library)
