@@ -118,10 +118,12 @@ def guarded(trial: Trial) -> Iterator[Finding]:
     blocks["DDSDDE"][: n * n], blocks["STRAN"][:n] = 0.0, 0.0
     blocks["DSTRAN"][:n] = strain_out(trial.strains()[0], n)
     before = {name: block.copy() for name, block in (blocks | shared).items()}
-    views = [blocks[name][None] for name in behind]
-    call = Call(*views, np.zeros((1, 2)), np.ones(1), shared)
+    stress, variables, tangent, strain, increment = (blocks[name][None] for name in behind)
+    call = Call(stress, variables, tangent, strain, increment, np.zeros((1, 2)), np.ones(1), shared)
     run(load(material.library), call, 0, 1)
-    changed = [name for name in ("STRAN", "DSTRAN", *shared) if not np.array_equal(before[name], (blocks | shared)[name])]
+    changed = [
+        name for name in ("STRAN", "DSTRAN", *shared) if not np.array_equal(before[name], (blocks | shared)[name])
+    ]
     changed += [] if not call.time.any() else ["TIME"]
     changed = [name for name in changed if name not in ("RPL", "DDSDDT", "DRPLDE", "DRPLDT")]
     yield _judged(not changed, "Inputs stay what they were", f"The routine changes its inputs: {', '.join(changed)}")
@@ -172,7 +174,9 @@ def differentiated(trial: Trial) -> Iterator[Finding]:
     material, strains, state = trial.material, trial.strains(), trial.state()
     call, components = computed(material, strains, state), _known(material.components)
     if not call.tangent.any():
-        yield Finding("note", "The routine leaves DDSDDE at zero: differences of its stress are taken, seven calls for one.")
+        yield Finding(
+            "note", "The routine leaves DDSDDE at zero: differences of its stress are taken, seven calls for one."
+        )
         return
     difference = np.zeros((COUNT, 6, 6))
     step = 1e-3 * trial.size
@@ -180,7 +184,7 @@ def differentiated(trial: Trial) -> Iterator[Finding]:
         moved = [computed(material, strains + sign * step * np.eye(6)[k], state) for sign in (1.0, -1.0)]
         up, down = (stress_in(each.stress, material.components) for each in moved)
         difference[:, :, k] = (up - down) / (2.0 * step)
-    place = np.ix_(range(COUNT), components, components)
+    place = np.ix_(np.arange(COUNT), components, components)
     apart = np.array([_apart(*pair) for pair in zip(tangent_in(call.tangent, material.components)[place],
                                                     difference[place], strict=True)])  # fmt: skip
     wrong = int((apart > CLOSE).sum())

@@ -99,7 +99,7 @@ def _(material: External) -> bool:
 
 @state_fields.register
 def _(material: External, state: ExternalState) -> dict[str, Array]:
-    """Return the state variables under the names Abaqus gives them, in small letters: sdv1, sdv2, …"""
+    """Return the state variables under sdv1, sdv2 and so on, the names that Abaqus gives them."""
     return {f"sdv{k + 1}": column for k, column in enumerate(state.variables.T)}
 
 
@@ -143,9 +143,7 @@ def _tangent(material: External, strain_increment: Array, old: ExternalState, ca
     return tangent
 
 
-def _status(
-    material: External, strain_increment: Array, old: ExternalState, call: Call, tangent: Array
-) -> np.ndarray:
+def _status(material: External, strain_increment: Array, old: ExternalState, call: Call, tangent: Array) -> np.ndarray:
     """Return the (n,) codes: bad input, then numbers that are not finite, then a wish for a smaller increment."""
     sound = np.isfinite(strain_increment).all(axis=1) & np.isfinite(old.stress).all(axis=1)
     if material.components == 4:  # there is no place for shear out of the plane

@@ -163,4 +163,6 @@ class Umat(Material):
     """Whether several threads may be in the routine at once."""
 
 
-AnyMaterial = Annotated[Elastic | VonMises | MohrCoulomb | DruckerPrager | ChangHicher | Umat, Field(discriminator="model")]
+AnyMaterial = Annotated[
+    Elastic | VonMises | MohrCoulomb | DruckerPrager | ChangHicher | Umat, Field(discriminator="model")
+]

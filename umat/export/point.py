@@ -96,7 +96,7 @@ def read(data, components, unit, stress, statev, dstran):
 @kernel
 def begin(constants, rule, data, components, props, count):
     """Fill the state of a first call; what STATEV holds already of void ratio and fabric is kept. True if possible."""
-    old, fabric, void_ratio, slip, force, gap, strain = data
+    old, fabric, void_ratio, slip, force = data[:5]
     if void_ratio[0] == 0.0:
         void_ratio[0] = props[VOID_RATIO]
     size = 0.0
