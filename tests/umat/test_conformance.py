@@ -1,5 +1,6 @@
 """Every fault that a routine may have is found and named, and a good routine has none."""
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -34,8 +35,6 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_faults_are_named(folder: Path, fault: int) -> None:
     findings = examined(External(compiled("faulty.c", folder), (float(fault),)), STRESS)
     verdict, part = FAULTS[fault]
-    import re
-
     assert any(each.verdict == verdict and re.search(part, each.sentence) for each in findings), findings
 
 
