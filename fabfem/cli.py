@@ -1,7 +1,8 @@
 """The ``fabfem`` command.
 
-Exit status: 0 done, 1 the pictures could not be drawn or an answer of the verification is wrong, 2 bad input, 3 a run
-that could not go on (all that converged is kept), 130 interrupted. Nothing heavy is imported before a command needs it.
+Exit status: 0 done, 1 the pictures could not be drawn, an answer of the verification is wrong or a UMAT breaks its
+contract, 2 bad input, 3 a run that could not go on (all that converged is kept), 130 interrupted. Nothing heavy is
+imported before a command needs it.
 """
 
 import argparse
@@ -137,6 +138,50 @@ def _verify(options: argparse.Namespace) -> int:
     return DONE if verify(chosen(options.only), options.json, options.quiet) else RED
 
 
+def _check_umat(options: argparse.Namespace) -> int:
+    from fabfem.routines import check_routine
+
+    findings = check_routine(
+        options.library, options.properties, options.state_variables, options.initial_state, options.components,
+        options.stress, options.size,
+    )  # fmt: skip
+    if not options.quiet:
+        print("\n".join(f"{finding.verdict:5} {finding.sentence}" for finding in findings))
+    bad = sum(finding.verdict == "bad" for finding in findings)
+    return _fail(f"{options.library}: {bad} of {len(findings)} findings are bad", RED) if bad else DONE
+
+
+def _export_umat(options: argparse.Namespace) -> int:
+    from fabfem.routines import export
+
+    lines = export(options.material, options.out, options.case, options.directions, options.units, options.cpu)
+    if not options.quiet:
+        print("\n".join(lines))
+    return DONE
+
+
+def _umat_commands(commands: argparse._SubParsersAction, common: argparse.ArgumentParser) -> None:
+    """Add the commands for compiled routines."""
+    check = commands.add_parser("check-umat", parents=[common], help="call a compiled UMAT and say what it keeps of it")
+    check.add_argument("library", type=Path, metavar="LIBRARY")
+    numbers = {"--properties": "PROPS", "--initial-state": "STATEV at the start", "--stress": "xx yy zz [yz xz xy]"}
+    for name, what in numbers.items():
+        check.add_argument(name, type=float, nargs="+", default=[], metavar="X", help=what)
+    check.add_argument("--state-variables", type=int, default=0, metavar="N", help="NSTATV")
+    check.add_argument("--components", type=int, choices=(4, 6), default=6, help="NTENS (default: 6)")
+    check.add_argument("--size", type=float, default=1e-4, metavar="X", help="norm of the strains (default: 1e-4)")
+    check.set_defaults(command=_check_umat)
+
+    export = commands.add_parser("export-umat", parents=[common], help="write a material as a library with a UMAT")
+    export.add_argument("--material", required=True, metavar="NAME", help="a sand, or with --case a material of it")
+    export.add_argument("--out", type=Path, required=True, metavar="LIBRARY")
+    export.add_argument("--case", type=Path, metavar="CASE.toml", help="case that has the material")
+    export.add_argument("--directions", default="bazant_oh_37", metavar="NAME", help="contact directions of a sand")
+    export.add_argument("--units", default="kN,m", metavar="FORCE,LENGTH", help="units of a sand (default: kN,m)")
+    export.add_argument("--cpu", default="host", metavar="NAME", help="processor, as LLVM names it (default: this one)")
+    export.set_defaults(command=_export_umat)
+
+
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="fabfem", description="Boundary-value problems in granular soil with an evolving fabric."
@@ -178,4 +223,5 @@ def _parser() -> argparse.ArgumentParser:
     verify.add_argument("--only", action="append", default=[], metavar="NAME", help="a problem; may be given again")
     verify.add_argument("--json", action="store_true", help="print the rows as JSON")
     verify.set_defaults(command=_verify)
+    _umat_commands(commands, common)
     return parser

@@ -8,6 +8,7 @@ bedding planes dip by θ that way.
 import re
 from collections.abc import Mapping
 from functools import singledispatch
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -51,6 +52,8 @@ class Surroundings(NamedTuple):
     """Axis that points up."""
     flat: bool
     """Whether the plane of the mesh is a plane of mirror symmetry."""
+    folder: Path = Path()
+    """Folder of the case file."""
 
 
 @singledispatch
@@ -88,6 +91,20 @@ def _(table: said.MohrCoulomb, scene: Surroundings) -> Substance:
 @substance.register
 def _(table: said.DruckerPrager, scene: Surroundings) -> Substance:
     return Substance(umat.DruckerPrager(**_own(table)), None, {})
+
+
+@substance.register
+def _(table: said.Umat, around: Surroundings) -> Substance:
+    if table.components == 4 and not around.flat:
+        raise MisfitError("components", "a routine of four components serves plane strain and axisymmetry only")
+    if len(table.initial_state) > table.state_variables:
+        given = len(table.initial_state)
+        raise MisfitError("initial_state", f"has {given} numbers, but state_variables is {table.state_variables}")
+    material = umat.External(
+        str(around.folder / table.library), table.properties, table.state_variables, table.initial_state,
+        table.components, table.time_step, table.thread_safe,
+    )  # fmt: skip
+    return Substance(material, None, {}, ("physical time in the external routine: TIME counts its calls",))
 
 
 @substance.register

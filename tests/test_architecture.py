@@ -16,7 +16,7 @@ PACKAGES = [
     *("umat", "fabfem", "fabfem/fem", "fabfem/boundary_value"),
     *("fabfem/laboratory", "fabfem/fabric_tests", "fabfem/study", "fabfem/verification"),
 ]
-OUTSIDE = {"umat": {"numba", "numpy", "scipy"}}
+OUTSIDE = {"umat": {"llvmlite", "numba", "numpy", "scipy"}}
 """Packages that a layer may import besides the standard library."""
 
 

@@ -25,6 +25,7 @@ __all__ = [
     "Directions",
     "DruckerPrager",
     "Elastic",
+    "External",
     "MohrCoulomb",
     "Response",
     "VonMises",
@@ -42,6 +43,7 @@ _HOMES = {
     "Directions": "directions",
     "DruckerPrager": "drucker_prager",
     "Elastic": "elastic",
+    "External": "external",
     "MohrCoulomb": "mohr_coulomb",
     "VonMises": "von_mises",
 }

@@ -111,7 +111,7 @@ def _substance(case: BoundaryValueCase, name: str, space: Space) -> Substance:
 
 def _surroundings(case: BoundaryValueCase, space: Space) -> Surroundings:
     flat = case.scene.kinematics in ("plane_strain", "axisymmetric")
-    return Surroundings(case.unit_system, space.mesh.dim - 1, flat)
+    return Surroundings(case.unit_system, space.mesh.dim - 1, flat, case.path.parent)
 
 
 def _with_rule(case: BoundaryValueCase, space: Space, rule: str) -> dict[str, Substance]:

@@ -4,7 +4,7 @@ from collections import Counter
 from collections.abc import Iterator
 
 from fabfem.case.boundary_value import BoundaryValueCase
-from fabfem.case.materials import ChangHicher
+from fabfem.case.materials import ChangHicher, Umat
 from fabfem.case.stages import COMPONENTS, DisplacementControl, Geostatic, Gravity, Load, StrengthReduction, Vector
 from fabfem.case.table import suggest
 
@@ -17,6 +17,7 @@ def contradictions(case: BoundaryValueCase) -> Iterator[tuple[str, str]]:
     yield from _odd_columns(case)
     yield from _odd_zones(case)
     yield from _odd_water(case)
+    yield from _unknown_strength(case)
 
 
 def _odd_columns(case: BoundaryValueCase) -> Iterator[tuple[str, str]]:
@@ -77,6 +78,16 @@ def _impossible_together(case: BoundaryValueCase) -> Iterator[tuple[str, str]]:
         fabric = material.fabric if isinstance(material, ChangHicher) else None
         if fabric and fabric.bedding_angle and case.scene.kinematics.startswith("axisymmetric"):
             yield f"material.{name}.fabric.bedding_angle", "must be 0: inclined bedding has no axis of symmetry"
+
+
+def _unknown_strength(case: BoundaryValueCase) -> Iterator[tuple[str, str]]:
+    """Yield external routines whose strength a search for the factor of safety would have to divide."""
+    for stage in case.stage:
+        kept = set(stage.excluded_zones or ()) if isinstance(stage, StrengthReduction) else None
+        for name, material in case.material.items():
+            if kept is not None and isinstance(material, Umat) and not kept.issuperset(material.zones or ("",)):
+                what = "is an external routine, whose strength cannot be divided; exclude its zones from the search"
+                yield f"material.{name}", what
 
 
 def _odd_zones(case: BoundaryValueCase) -> Iterator[tuple[str, str]]:

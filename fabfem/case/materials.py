@@ -143,4 +143,26 @@ class ChangHicher(Material):
         return void_ratio
 
 
-AnyMaterial = Annotated[Elastic | VonMises | MohrCoulomb | DruckerPrager | ChangHicher, Field(discriminator="model")]
+class Umat(Material):
+    """A compiled routine with the Abaqus UMAT argument list (small strain)."""
+
+    model: Literal["umat"]
+    library: Text
+    """Shared library with the routine; relative to the case file."""
+    properties: Annotated[tuple[float, ...], Field(strict=False)] = ()
+    """PROPS, in the routine's own units and sign."""
+    state_variables: Annotated[int, Field(ge=0)] = 0
+    """Number of state variables (NSTATV)."""
+    initial_state: Annotated[tuple[float, ...], Field(strict=False)] = ()
+    """State variables (STATEV) before the first increment; those left out are zero."""
+    components: Literal[4, 6] = 6
+    """Stress components that the routine knows (NTENS): 6, or 4 where it knows plane strain and axisymmetry only."""
+    time_step: Positive = 1.0
+    """Time increment (DTIME) of every call."""
+    thread_safe: bool = False
+    """Whether several threads may be in the routine at once."""
+
+
+AnyMaterial = Annotated[
+    Elastic | VonMises | MohrCoulomb | DruckerPrager | ChangHicher | Umat, Field(discriminator="model")
+]

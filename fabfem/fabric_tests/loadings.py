@@ -23,7 +23,7 @@ def compute_histories(drive: said.Loading, case: FabricCase) -> tuple[Group, ...
     """Return the histories of all pairs of b and α; those that end at the same record together."""
     ((name, table),) = case.material.items()
     with blamed(case, f"material.{name}"):
-        sand = substance(table, Surroundings(case.unit_system, VERTICAL, flat=False))
+        sand = substance(table, Surroundings(case.unit_system, VERTICAL, flat=False, folder=case.path.parent))
         variants = list(product(drive.b, drive.alpha))
         stress = np.tile(drive.pressure * IDENTITY, (len(variants), 1))
         state = umat.initial_state(sand.material, sand.directions, stress, **sand.needs)

@@ -60,7 +60,7 @@ def build(case: ElementCase) -> Specimen:
     """
     ((name, table),) = case.material.items()
     with _blamed(case, f"material.{name}"):
-        filling = substance(table, Surroundings(case.unit_system, VERTICAL, False))
+        filling = substance(table, Surroundings(case.unit_system, VERTICAL, False, case.path.parent))
         material = _refined(filling.material, table, case.accuracy.curve)
         state = umat.initial_state(material, filling.directions, initial_stress(case)[None], **filling.needs)
     fields = umat.state_fields(material, state)
