@@ -155,6 +155,9 @@ class Sweep(Runs):
         for name in (*asked, *(self.measured.where.values() if self.measured else ())):
             if name not in known:
                 raise ValueError(f"there is no parameter '{name}'{suggest(name, known)}")
+        for picture in self.picture:
+            if not picture.states and self.rows != "all":
+                raise ValueError(f"picture '{picture.name}' draws whole histories and needs rows = 'all'")
         return self
 
 

@@ -20,7 +20,7 @@ from fabfem.study.processes import LEAST, Job, Pool
 from fabfem.study.variants import ABOUT_RUNS, Choice, Tables, variant
 from fabfem.study.worker import FINAL, Ran, Task
 
-ASIDE = ("cli.py", "study", "pictures", "__main__.py")
+ASIDE = ("cli.py", "gallery.py", "study", "pictures", "__main__.py")
 """Parts of the package that decide no result."""
 
 

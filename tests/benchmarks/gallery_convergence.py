@@ -1,0 +1,61 @@
+"""How well the curves of the gallery's sweeps are converged: the runs at both ends of each against runs ten times finer.
+
+    python tests/benchmarks/gallery_convergence.py cases/element/zk_*.toml
+
+prints, for each case, the largest distance of a curve from its fine one over the largest value of the fine one, for each
+column, at equal strain (the rows of both runs). The fine runs have a tenth of ``accuracy.curve``.
+"""
+
+import sys
+import tempfile
+from pathlib import Path
+
+import numpy as np
+
+from fabfem.case import read_case, read_tables
+from fabfem.study.processes import Pool, limits
+from fabfem.study.store import Plan, Run, runs
+from fabfem.study.variants import Choice, Setting, choices
+
+FINER = 10.0
+COLUMNS = ("p", "q", "eps_v", "F_norm")
+
+
+def main(files: list[Path]) -> None:
+    """Print the distances of all cases."""
+    with tempfile.TemporaryDirectory() as folder, Pool(limits()) as pool:
+        for file in files:
+            found = distances(file, Path(folder), pool)
+            said = "  ".join(f"{name} {100.0 * found[name]:.3f} %" for name in COLUMNS if name in found)
+            print(f"{file.stem:24s} {said}", flush=True)
+
+
+def distances(file: Path, folder: Path, pool: Pool) -> dict[str, float]:
+    """Return the largest relative distance of each column, over the first and last run of a sweep."""
+    case = read_case(file)
+    every = choices(case.sweep.parameter)
+    ends = [every[0], every[-1]]
+    finer = Setting("accuracy", ("accuracy.curve",), case.accuracy.curve / FINER)
+    pairs: dict[Choice, Run] = {
+        run.choice: run
+        for run in runs(Plan(read_tables(file), file, folder, [*ends, *((*c, finer) for c in ends)]), pool)
+    }
+    found: dict[str, float] = {}
+    for choice in ends:
+        coarse, fine = pairs[choice].history(), pairs[(*choice, finer)].history()
+        for name in COLUMNS:
+            if name in fine and coarse:
+                found[name] = max(found.get(name, 0.0), distance(coarse[name], fine[name]))
+    return found
+
+
+def distance(coarse: list[str], fine: list[str]) -> float:
+    """Return the largest distance of two columns row by row, over the largest of the second."""
+    common = min(len(coarse), len(fine))
+    a, b = (np.array([float(x) for x in column[:common]]) for column in (coarse, fine))
+    top = np.abs(b).max()
+    return float(np.abs(a - b).max() / top) if top > 1e-9 else 0.0
+
+
+if __name__ == "__main__":
+    main([Path(argument) for argument in sys.argv[1:]])
