@@ -101,6 +101,8 @@ class Exponential(Table):
 
     name: Text
     """Name in the picture."""
+    x: Text | None = None
+    """Column across of the panel that it belongs to; all panels when left out."""
     factor: float
     """Value at x = 0."""
     rate: float

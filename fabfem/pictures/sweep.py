@@ -9,6 +9,7 @@ import json
 from collections.abc import Sequence
 from itertools import cycle
 from pathlib import Path
+from textwrap import fill
 from typing import Any
 
 import numpy as np
@@ -46,7 +47,7 @@ def draw(folder: Path) -> tuple[Path, ...]:
     pictures = []
     for picture in about["pictures"]:
         figure = _states(folder, about, picture) if picture["states"] else _curves(folder, about, picture)
-        figure.suptitle(about["title"], fontsize=10)
+        figure.suptitle(fill(about["title"], int(12 * figure.get_figwidth())), fontsize=10)
         FigureCanvasAgg(figure)
         figure.savefig(folder / f"{picture['name']}.png", dpi=100)
         pictures.append(folder / f"{picture['name']}.png")
@@ -92,7 +93,7 @@ def _states(folder: Path, about: Any, picture: Any) -> Figure:
             label = f"{state.replace('_', ' ')} ({len(at)})"
             ax.plot(*(np.array(at).reshape(-1, 2).T), marker, color=colour, markersize=5, label=label)
             points += at
-        _exponentials(ax, points, fit, picture["curves"])
+        _exponentials(ax, points, fit, [curve for curve in picture["curves"] if curve["x"] in (None, x)])
         _plain(ax, x, y, units)
         ax.legend(fontsize=8, frameon=False)
     return figure
@@ -101,6 +102,7 @@ def _states(folder: Path, about: Any, picture: Any) -> Figure:
 def _exponentials(ax: Axes, points: Sequence[tuple[float, float]], fit: Any, curves: Any) -> None:
     """Draw the best exponential, and those of the source, over the points."""
     if not points:
+        ax.text(0.5, 0.5, "no such state on the way", transform=ax.transAxes, ha="center", fontsize=9)
         return
     found = np.array(points)
     x = np.linspace(np.nanmin(found[:, 0]), np.nanmax(found[:, 0]), 100)

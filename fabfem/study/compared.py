@@ -57,7 +57,7 @@ def write(folder: Path, said: MeasuredRuns, found: Sequence[Answered]) -> None:
 
 
 def differences(said: MeasuredRuns, found: Sequence[Answered]) -> Iterator[list[Any]]:
-    """Yield test, curve, number of points, root mean square and largest difference; then those of all tests together."""
+    """Yield test, curve, points, root mean square and largest difference; then those of all tests together."""
     for number, curve in enumerate(said.curve):
         gaps = {measured.name: answered[number] - measured.values[number] for measured, answered in found}
         together = {"all": np.concatenate(list(gaps.values()))} if gaps else {}

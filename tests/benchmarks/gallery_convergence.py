@@ -1,9 +1,9 @@
-"""How well the curves of the gallery's sweeps are converged: the runs at both ends of each against runs ten times finer.
+"""Convergence of the gallery's curves: the runs at both ends of each sweep against runs ten times finer.
 
     python tests/benchmarks/gallery_convergence.py cases/element/zk_*.toml
 
-prints, for each case, the largest distance of a curve from its fine one over the largest value of the fine one, for each
-column, at equal strain (the rows of both runs). The fine runs have a tenth of ``accuracy.curve``.
+prints, for each case and column, the largest distance of a curve from its fine one, row by row at equal strain, over
+the largest value of the fine one. The fine runs have a tenth of ``accuracy.curve``.
 """
 
 import sys
