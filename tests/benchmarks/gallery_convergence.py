@@ -2,8 +2,8 @@
 
     python tests/benchmarks/gallery_convergence.py cases/element/zk_*.toml
 
-prints, for each case and column, the largest distance of a curve from its fine one, row by row at equal strain, over
-the largest value of the fine one. The fine runs have a tenth of ``accuracy.curve``.
+prints, for each case and column, the largest distance of a curve from its fine one, at equal strain, over the largest
+value of the fine one. The fine runs have a tenth of ``accuracy.curve``.
 """
 
 import sys
@@ -45,16 +45,18 @@ def distances(file: Path, folder: Path, pool: Pool) -> dict[str, float]:
         coarse, fine = pairs[choice].history(), pairs[(*choice, finer)].history()
         for name in COLUMNS:
             if name in fine and coarse:
-                found[name] = max(found.get(name, 0.0), distance(coarse[name], fine[name]))
+                here = distance(*((run["fraction"], run[name]) for run in (coarse, fine)))
+                found[name] = max(found.get(name, 0.0), here)
     return found
 
 
-def distance(coarse: list[str], fine: list[str]) -> float:
-    """Return the largest distance of two columns row by row, over the largest of the second."""
-    common = min(len(coarse), len(fine))
-    a, b = (np.array([float(x) for x in column[:common]]) for column in (coarse, fine))
-    top = np.abs(b).max()
-    return float(np.abs(a - b).max() / top) if top > 1e-9 else 0.0
+def distance(coarse: tuple[list[str], list[str]], fine: tuple[list[str], list[str]]) -> float:
+    """Return the largest distance of two curves, each (share of the target, values), over the largest of the second."""
+    (across, values), (places, truth) = (np.array(curve, dtype=float) for curve in (coarse, fine))
+    reached = places <= across[-1]
+    top = np.abs(truth).max()
+    gap = np.abs(np.interp(places[reached], across, values) - truth[reached]).max()
+    return float(gap / top) if top > 1e-9 else 0.0
 
 
 if __name__ == "__main__":
