@@ -84,8 +84,15 @@ def _sweep(options: argparse.Namespace) -> int:
     from fabfem.study.sweep import sweep
 
     swept = sweep(options.case, _folder(options, "sweep"), options.quiet)
+    pictures: tuple[Path, ...] = ()
+    if swept.pictures:
+        from fabfem.pictures.sweep import draw
+
+        pictures = draw(swept.folder)
     if not options.quiet:
-        print(f"{swept.completed} of {swept.runs} runs completed\n  {swept.table}")
+        print(
+            f"{swept.completed} of {swept.runs} runs completed", *(f"  {p}" for p in (swept.table, *pictures)), sep="\n"
+        )
     return DONE if swept.completed == swept.runs else STOPPED
 
 
@@ -129,6 +136,13 @@ def _show(options: argparse.Namespace) -> int:
     if not options.quiet:
         print("\n".join(str(picture) for picture in shown.pictures))
     return _fail(shown.trouble, NO_PICTURE) if shown.trouble else DONE
+
+
+def _gallery(options: argparse.Namespace) -> int:
+    from fabfem.gallery import RIGHT, case_files, gallery
+
+    shown = gallery(case_files(options.cases), options.out, options.quiet, options.pictures)
+    return DONE if all(one.status == RIGHT for one in shown) else STOPPED
 
 
 def _verify(options: argparse.Namespace) -> int:
@@ -218,6 +232,16 @@ def _parser() -> argparse.ArgumentParser:
     show = commands.add_parser("show", parents=[common], help="draw pictures of a result")
     show.add_argument("folder", type=Path, metavar="DIR")
     show.set_defaults(command=_show)
+
+    gallery = commands.add_parser("gallery", parents=[common], help="run and draw all cases of a folder")
+    gallery.add_argument(
+        "cases", type=Path, metavar="FOLDER", help="folder of cases, or its name in cases: element, ..."
+    )
+    gallery.add_argument(
+        "--out", type=Path, metavar="DIR", default=Path("results/gallery"), help="folder of the results"
+    )
+    gallery.add_argument("--pictures", type=Path, metavar="DIR", help="folder that gets a copy of every picture")
+    gallery.set_defaults(command=_gallery)
 
     verify = commands.add_parser("verify", parents=[common], help="run problems with known answers and compare")
     verify.add_argument("--only", action="append", default=[], metavar="NAME", help="a problem; may be given again")

@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
-from fabfem.case.table import Names, NotNegative, Positive, Table, Text
+from fabfem.case.table import Identifier, Names, NotNegative, Positive, SomeNames, Table, Text, suggest
 
 Scalar = bool | int | float | str
 Value = Annotated[Scalar | Annotated[tuple[Scalar, ...], Field(strict=False)], Field(union_mode="smart")]
@@ -28,6 +28,19 @@ class Parameter(Table):
     """Values that it takes."""
     set: dict[str, Value] = Field(default={})
     """Values by place that go with all of them."""
+    each: bool = False
+    """Whether each value is a list, with an entry for each place."""
+    labels: Names | None = None
+    """Names of the values in tables and pictures; the values themselves when left out."""
+
+    @model_validator(mode="after")
+    def _listed(self) -> "Parameter":
+        if self.labels is not None and len(self.labels) != len(self.values):
+            raise ValueError(f"has {len(self.values)} values and {len(self.labels)} labels")
+        for number, value in enumerate(self.values if self.each else (), 1):
+            if not isinstance(value, tuple) or len(value) != len(self.at):
+                raise ValueError(f"value {number} must be a list of {len(self.at)}, an entry for each place")
+        return self
 
 
 class Runs(Table):
@@ -39,6 +52,90 @@ class Runs(Table):
     """Memory that all of them may take together [MiB]; 0 is what the machine has free."""
 
 
+class Reading(Table):
+    """A number of the history, met where another column passes a value."""
+
+    column: Text
+    """Column, without its unit."""
+    value: float
+    """Value of that column, which is interpolated between rows."""
+
+
+class Axis(Table):
+    """A column of the measured data and the column of the history that answers it."""
+
+    data: Text
+    """Column of the data."""
+    history: Text
+    """Column of the history, without its unit."""
+    divide_by: Text | None = None
+    """Column of the history to divide by, such as the other stress of a ratio."""
+    scale: float = 1.0
+    """Factor on the column of the history, such as 100 for per cent."""
+    error: Positive = 1.0
+    """Size of an error that counts as one, in the units of the data."""
+
+
+class Comparison(Table):
+    """Measured curves, and what answers them."""
+
+    data: Text
+    """CSV file of the measured data, relative to the case file; lines that start with # are passed over."""
+    over: Axis
+    """Abscissa along which the curves are compared."""
+    curve: Annotated[tuple[Axis, ...], Field(min_length=1, strict=False)]
+    """Ordinates that are compared."""
+    stage: Text | None = None
+    """Stage whose rows count; all when left out."""
+
+
+class MeasuredRuns(Comparison):
+    """Measured curves beside those of a sweep."""
+
+    where: Annotated[dict[Text, Text], Field(min_length=1)]
+    """Parameter of the sweep whose value a column of the data has in the rows that belong to a run."""
+
+
+class Exponential(Table):
+    """A curve y = factor exp(rate x) of a source."""
+
+    name: Text
+    """Name in the picture."""
+    x: Text | None = None
+    """Column across of the panel that it belongs to; all panels when left out."""
+    factor: float
+    """Value at x = 0."""
+    rate: float
+    """Exponent over x."""
+
+
+class SweptPicture(Table):
+    """A picture of all runs of a sweep: columns of their histories, or the states that they pass."""
+
+    name: Identifier
+    """Name of the file."""
+    x: Names
+    """Column across; a list makes a panel of each entry."""
+    y: Names
+    """Column upwards; a list as long as that of x."""
+    colour: Text | None = None
+    """Parameter whose values have colours; the first when left out."""
+    style: Text | None = None
+    """Parameter whose values have styles of line."""
+    until: Reading | None = None
+    """Rows of a run after the first that passes this value are left out."""
+    states: SomeNames = ()
+    """States to draw as points, by their names in the report, with the best exponential through all of them."""
+    curves: Annotated[tuple[Exponential, ...], Field(strict=False)] = ()
+    """Curves to draw with the states."""
+
+    @model_validator(mode="after")
+    def _paired(self) -> "SweptPicture":
+        if len(self.x) != len(self.y):
+            raise ValueError(f"x and y must be lists of one length (got {len(self.x)} and {len(self.y)})")
+        return self
+
+
 class Sweep(Runs):
     """The product of some parameters."""
 
@@ -48,15 +145,22 @@ class Sweep(Runs):
     """Rows of each history that go into the table."""
     columns: Names | None = None
     """Columns of the history that go into the table; all when left out."""
+    measured: MeasuredRuns | None = None
+    """Measured curves that the runs are compared with."""
+    picture: Annotated[tuple[SweptPicture, ...], Field(strict=False)] = ()
+    """Pictures of all runs."""
 
-
-class Reading(Table):
-    """A number of the history, met where another column passes a value."""
-
-    column: Text
-    """Column, without its unit."""
-    value: float
-    """Value of that column, which is interpolated between rows."""
+    @model_validator(mode="after")
+    def _named(self) -> "Sweep":
+        known = [parameter.name for parameter in self.parameter]
+        asked = [name for picture in self.picture for name in (picture.colour, picture.style) if name is not None]
+        for name in (*asked, *(self.measured.where.values() if self.measured else ())):
+            if name not in known:
+                raise ValueError(f"there is no parameter '{name}'{suggest(name, known)}")
+        for picture in self.picture:
+            if not picture.states and self.rows != "all":
+                raise ValueError(f"picture '{picture.name}' draws whole histories and needs rows = 'all'")
+        return self
 
 
 class Quantity(Table):
@@ -159,21 +263,6 @@ class Fitted(Table):
         return self
 
 
-class Axis(Table):
-    """A column of the measured data and the column of the history that answers it."""
-
-    data: Text
-    """Column of the data."""
-    history: Text
-    """Column of the history, without its unit."""
-    divide_by: Text | None = None
-    """Column of the history to divide by, such as the other stress of a ratio."""
-    scale: float = 1.0
-    """Factor on the column of the history, such as 100 for per cent."""
-    error: Positive = 1.0
-    """Size of an error that counts as one, in the units of the data."""
-
-
 class Measured(Table):
     """A measured test: its rows of the data, and the case that repeats it."""
 
@@ -183,21 +272,13 @@ class Measured(Table):
     """Values by place that the case has for this test."""
 
 
-class Calibration(Runs):
+class Calibration(Comparison, Runs):
     """A least-squares fit of parameters to measured curves."""
 
-    data: Text
-    """CSV file of the measured data, relative to the case file; lines that start with # are passed over."""
-    over: Axis
-    """Abscissa along which the curves are compared."""
-    curve: Annotated[tuple[Axis, ...], Field(min_length=1, strict=False)]
-    """Ordinates that are compared."""
     test: Annotated[tuple[Measured, ...], Field(min_length=1, strict=False)]
     """Tests that are fitted together."""
     parameter: Annotated[tuple[Fitted, ...], Field(min_length=1, strict=False)]
     """Parameters that are fitted."""
-    stage: Text | None = None
-    """Stage whose rows count; all when left out."""
     tolerance: Positive = 1e-3
     """Change of the parameters, over the distance of their bounds, at which the fit is done."""
     step: Positive = 0.01

@@ -95,6 +95,11 @@ def _principal(k: int) -> Callable[[Row], Any]:
     return lambda row: mandel.principal(row.stress)[k]
 
 
+def _shear(row: Row) -> Any:
+    major, _, minor = mandel.principal(row.strain)
+    return major - minor
+
+
 def _loading(row: Row) -> Any:
     extension = row.zeta.extension if row.zeta else 1.0
     return measures.dot(row.fabric, measures.loading_direction(row.stress, extension))
@@ -116,6 +121,7 @@ MEASURES: dict[str, Measure] = {
     **{f"sigma_{k + 1}": Measure("stress", _principal(k)) for k in range(3)},
     "eps_v": Measure("none", lambda row: mandel.trace(row.strain)),
     "eps_q": Measure("none", lambda row: measures.deviatoric_strain(row.strain)),
+    "gamma": Measure("none", _shear),
     "q_axial": Measure("stress", lambda row: row.stress[2] - 0.5 * (row.stress[0] + row.stress[1])),
     "eps_axial": Measure("none", lambda row: row.strain[2]),
     "tau_xz": Measure("stress", lambda row: row.stress[4] / FACTOR[4]),

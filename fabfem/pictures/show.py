@@ -46,13 +46,15 @@ def show(folder: Path) -> Shown:
     Parameters
     ----------
     folder : Path
-        Folder that ``fabfem solve`` wrote.
+        Folder that ``fabfem solve`` or ``fabfem sweep`` wrote.
 
     Raises
     ------
     CaseError
         If the folder holds no result.
     """
+    if (folder / "sweep.json").is_file():
+        return Shown(tuple(import_module("fabfem.pictures.sweep").draw(folder)), "")
     if not (folder / "history.csv").is_file():
         raise CaseError(f"{folder}: holds no result (there is no history.csv)")
     drawer = DRAWERS.get(_kind(folder))

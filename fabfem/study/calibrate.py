@@ -21,7 +21,7 @@ from fabfem.case.study import Calibration, Fitted
 from fabfem.outcome import make_folder
 from fabfem.output.atomic import write_atomic
 from fabfem.study.certainty import Certainty, blind_spots, certainty
-from fabfem.study.measured import Curves, answers, measured_curves, residuals
+from fabfem.study.measured import Curves, answers, curve_table, measured_curves, residuals
 from fabfem.study.processes import Pool, limits
 from fabfem.study.quantity import QuantityError
 from fabfem.study.store import Plan, Run, runs
@@ -178,7 +178,10 @@ def _write(fit: Fit, start: Array, best: Array) -> Calibrated:
     }
     write_atomic(fit.folder / "calibration.json", json.dumps(content, indent=1) + "\n")
     write_atomic(fit.folder / "calibration.csv", _parameter_table(parameters, best, known))
-    write_atomic(fit.folder / "calibration_curves.csv", _curve_table(fit, best))
+    write_atomic(
+        fit.folder / "calibration_curves.csv",
+        curve_table(fit.said, list(zip(fit.measured, fit.known[tuple(best)], strict=True))),
+    )
     return Calibrated(fit.folder, values, sentences)
 
 
@@ -211,16 +214,4 @@ def _parameter_table(parameters: Sequence[Fitted], best: Array, known: Certainty
     writer.writerow(["parameter", "value", "start", "lower", "upper", "scale", "deviation_over_bounds"])
     for p, z, deviation in zip(parameters, best, known.deviations, strict=True):
         writer.writerow([p.name, repr(_from_unit(p, z)), p.start, p.lower, p.upper, p.scale, f"{deviation:.4g}"])
-    return lines.getvalue()
-
-
-def _curve_table(fit: Fit, best: Array) -> str:
-    lines = StringIO()
-    writer = csv.writer(lines, lineterminator="\n")
-    columns = [curve.data for curve in fit.said.curve]
-    writer.writerow(["test", fit.said.over.data, *(f"{c} {w}" for c in columns for w in ("measured", "case"))])
-    for measured, answered in zip(fit.measured, fit.known[tuple(best)], strict=True):
-        pairs = [part for pair in zip(measured.values, answered, strict=True) for part in pair]
-        for row in zip(measured.along, *pairs, strict=True):
-            writer.writerow([measured.name, *(f"{value:.6g}" for value in row)])
     return lines.getvalue()

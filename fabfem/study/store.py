@@ -20,8 +20,8 @@ from fabfem.study.processes import LEAST, Job, Pool
 from fabfem.study.variants import ABOUT_RUNS, Choice, Tables, variant
 from fabfem.study.worker import FINAL, Ran, Task
 
-ASIDE = ("cli.py", "study", "pictures", "__main__.py")
-"""Parts of the package that decide no result."""
+ASIDE = ("cli.py", "gallery.py", "study", "pictures", "__main__.py", "case/study.py")
+"""Parts of the package that decide no result of a run."""
 
 
 class Run(NamedTuple):
@@ -124,7 +124,8 @@ def sources() -> str:
     for package in (umat, fabfem):
         root = Path(package.__file__ or "").parent
         for source in sorted(root.rglob("*.py")):
-            if source.relative_to(root).parts[0] not in ASIDE:
+            place = source.relative_to(root)
+            if place.parts[0] not in ASIDE and place.as_posix() not in ASIDE:
                 digest.update(source.read_bytes())
     return digest.hexdigest()
 

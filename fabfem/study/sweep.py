@@ -1,11 +1,14 @@
 """A sweep: the product of some parameters of a case, collected in one table, ``sweep.csv``.
 
 Each run has its row, or with ``rows = "all"`` each row of its history: the parameters, how the run ended, what it took,
-and the columns of the history. A run that did not complete has its row too.
+and the columns of the history. A run that did not complete has its row too. ``sweep.json`` says what the pictures need;
+where they show states, ``states.csv`` has them, and measured curves come with ``measured.csv``.
 """
 
 import csv
+import json
 from collections.abc import Iterator, Sequence
+from contextlib import nullcontext
 from io import StringIO
 from pathlib import Path
 from statistics import median
@@ -16,6 +19,7 @@ from fabfem.case.study import Sweep
 from fabfem.outcome import make_folder
 from fabfem.output.atomic import write_atomic
 from fabfem.output.history import read_history
+from fabfem.study import compared, states
 from fabfem.study.processes import Pool, limits
 from fabfem.study.progress import shown, text
 from fabfem.study.store import Plan, Run, name_of, runs
@@ -36,10 +40,30 @@ class Swept(NamedTuple):
     """Runs in it."""
     completed: int
     """Those that completed."""
+    pictures: int
+    """Pictures that the case asks for."""
+    seconds: float
+    """Processor time of all runs [s], those that were kept from before included."""
+
+    @property
+    def folder(self) -> Path:
+        """Folder of the results."""
+        return self.table.parent
 
 
-def sweep(path: Path, folder: Path, quiet: bool = False) -> Swept:
+def sweep(path: Path, folder: Path, quiet: bool = False, pool: Pool | None = None) -> Swept:
     """Run the sweep of a case file and return where its table is; runs that are there already are not repeated.
+
+    Parameters
+    ----------
+    path : Path
+        Case file.
+    folder : Path
+        Where the results go.
+    quiet : bool
+        Show no progress.
+    pool : Pool, optional
+        Processes to use; those that the case asks for by default.
 
     Raises
     ------
@@ -52,12 +76,34 @@ def sweep(path: Path, folder: Path, quiet: bool = False) -> Swept:
     make_folder(folder)
     plan = Plan(read_tables(path), path, folder, wanted)
     done: dict[Any, Run] = {}
-    with Pool(limits(said.workers, said.memory)) as pool:
-        for run in shown(runs(plan, pool), len(wanted), quiet):
+    with nullcontext(pool) if pool else Pool(limits(said.workers, said.memory)) as processes:
+        for run in shown(runs(plan, processes), len(wanted), quiet):
             done[run.choice] = run
             _write(folder / "sweep.csv", said, [done[choice] for choice in wanted if choice in done], case.path.name)
-    ended = [run.ran.status for run in done.values()]
-    return Swept(folder / "sweep.csv", len(ended), ended.count("completed"))
+    in_order = [done[choice] for choice in wanted if choice in done]
+    _conclude(case, said, in_order, folder)
+    ended = [run.ran.status for run in in_order]
+    seconds = sum(median(run.ran.cpu) for run in in_order if run.ran.cpu)
+    pictures = len(said.picture) + (said.measured is not None)
+    return Swept(folder / "sweep.csv", len(ended), ended.count("completed"), pictures, seconds)
+
+
+def _conclude(case: Case, said: Sweep, ended: Sequence[Run], folder: Path) -> None:
+    """Write what takes all runs: states, comparisons, and what the pictures need."""
+    passed = states.states(ended) if any(picture.states for picture in said.picture) else []
+    if passed:
+        write_atomic(folder / "states.csv", states.table(passed))
+    if said.measured:
+        file = case.locate(said.measured.data)
+        compared.write(folder, said.measured, compared.measured_of(said.measured, ended, file, case.path.name))
+    about = {
+        "case": case.path.name,
+        "title": case.title,
+        "parameters": [parameter.name for parameter in said.parameter],
+        "pictures": [picture.model_dump(mode="json") for picture in said.picture],
+        "fits": states.fits(said, passed),
+    }
+    write_atomic(folder / "sweep.json", json.dumps(about, indent=1, ensure_ascii=False) + "\n")
 
 
 def asked(case: Case, table: T | None, name: str) -> T:

@@ -72,8 +72,18 @@ def one_at_a_time(parameters: Sequence[Parameter]) -> list[Choice]:
 
 def settings_of(parameter: Parameter) -> list[Setting]:
     """Return the settings that a parameter takes."""
-    also = tuple(parameter.set.items())
-    return [Setting(parameter.name, parameter.at, value, also) for value in parameter.values]
+    return [_setting(parameter, number) for number in range(len(parameter.values))]
+
+
+def _setting(parameter: Parameter, number: int) -> Setting:
+    """Return a setting; one that is known by a label, or has a value for each place, has its values in `also`."""
+    value, also = parameter.values[number], tuple(parameter.set.items())
+    label = parameter.labels[number] if parameter.labels else None
+    if not parameter.each and label is None:
+        return Setting(parameter.name, parameter.at, value, also)
+    entries = value if parameter.each and isinstance(value, tuple) else [value] * len(parameter.at)
+    shown = value if label is None else label
+    return Setting(parameter.name, (), shown, (*also, *zip(parameter.at, entries, strict=True)))
 
 
 class _Entry(NamedTuple):
