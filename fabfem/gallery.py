@@ -6,7 +6,6 @@ were made, which hardly depends on what else the machine does.
 """
 
 import json
-import shutil
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from statistics import median
@@ -23,6 +22,8 @@ from fabfem.study.processes import Pool, limits
 from fabfem.study.store import Plan, runs
 from fabfem.study.sweep import sweep
 
+COLOURS = 64
+"""Colours of the copies of pictures."""
 RIGHT = "completed"
 """Status of a case whose runs and pictures are all there."""
 
@@ -136,9 +137,12 @@ def _names(pictures: Sequence[Path]) -> tuple[str, ...]:
 
 
 def _copy(one: Shown, pictures: Path) -> None:
+    from PIL import Image
+
     pictures.mkdir(parents=True, exist_ok=True)
-    for picture in map(Path, one.pictures):
-        shutil.copyfile(picture, pictures / f"{one.case}_{picture.name}")
+    for picture in map(Path, one.pictures):  # few colours make the file of a line drawing a third as large
+        small = Image.open(picture).convert("RGB").quantize(COLOURS)
+        small.save(pictures / f"{one.case}_{picture.name}", optimize=True)
 
 
 def _table(shown: Sequence[Shown]) -> Table:

@@ -25,6 +25,7 @@ from fabfem.pictures.curves import STYLES
 from fabfem.pictures.laboratory import LABELS
 from fabfem.pictures.work_precision import COLOURS
 
+ROUNDING = 1e-9
 MARKERS = "osD^vP"
 ACROSS = 4
 """Most panels side by side."""
@@ -126,7 +127,7 @@ def _runs(lines: Sequence[dict[str, str]], parameters: Sequence[str], picture: A
         columns = {name: np.array([_number(row[name]) for row in rows]) for name in rows[0]}
         past = np.zeros(len(rows), bool)
         if picture["until"]:
-            past = np.asarray(columns[picture["until"]["column"]]) > picture["until"]["value"]
+            past = np.asarray(columns[picture["until"]["column"]]) > picture["until"]["value"] * (1.0 + ROUNDING)
         end = int(np.argmax(past)) if past.any() else len(rows)
         runs.append(dict(zip(parameters, values, strict=True)) | {"columns": {k: v[:end] for k, v in columns.items()}})
     return runs
