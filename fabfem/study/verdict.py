@@ -4,7 +4,7 @@ from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 from fabfem.case.study import Knob, Study
-from fabfem.study.convergence import cheapest, fitted_order, richardson
+from fabfem.study.convergence import ROUNDING, cheapest, fitted_order, richardson
 from fabfem.study.progress import label
 from fabfem.study.quantity import distance
 from fabfem.study.store import Run
@@ -119,7 +119,7 @@ def _dominating(study: Study, rows: Sequence[Measured], values: Values) -> Itera
         for knob in study.knob
         if not knob.set and (settings_of(knob)[-1],) in values
     }
-    if shares:
+    if max(shares.values(), default=0.0) > ROUNDING:
         worst = max(shares, key=lambda name: shares[name])
         listed = ", ".join(f"{name} {100.0 * share:.2g} %" for name, share in shares.items())
         total = next(row.error for row in rows if row.run.choice == ())

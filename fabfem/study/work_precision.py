@@ -91,7 +91,10 @@ def _values(said: Study, found: dict[Choice, Run]) -> tuple[dict[Choice, Array],
     troubles: dict[Choice, str] = {}
     for choice, run in found.items():
         try:
-            values[choice] = quantity_of(run.history(), said.quantity)
+            value = quantity_of(run.history(), said.quantity)
+            if said.quantity.take == "last" and run.ran.status != "completed":
+                raise QuantityError("the last row is not that of a completed run")
+            values[choice] = value
         except QuantityError as error:
             troubles[choice] = run.ran.reason or str(error)
     return values, troubles

@@ -28,7 +28,8 @@ FABRICS = {
 def main(folder: Path) -> None:
     """Print a row for each fabric and force."""
     tables = read_tables(CASE)
-    print("| fabric | f_ref [N] | σ1/σ3 | ε_v [%] |\n|---|---|---|---|")
+    print("| σ1/σ3, ε_v [%] at f_ref [N] |", *(f"{1e3 * force:g} |" for force in FORCES))
+    print("|---|" + "---|" * len(FORCES))
     with Pool(limits()) as pool:
         for name, fabric in FABRICS.items():
             sand = {"sand": tables["material"]["sand"] | {"fabric": fabric}}
@@ -38,9 +39,8 @@ def main(folder: Path) -> None:
             fit = Fit(case, case.calibration, measured, tables | {"material": sand}, folder, pool, Console(quiet=True))
             units = [np.array([to_unit(case.calibration.parameter[0], force)]) for force in FORCES]
             fit.answer(units)
-            for force, unit in zip(FORCES, units, strict=True):
-                rms = fit.rms(unit)["all"]
-                print(f"| {name} | {1e3 * force:g} | {rms['sr']:.3f} | {rms['eps_v_pct']:.2f} |", flush=True)
+            rms = [fit.rms(unit)["all"] for unit in units]
+            print(f"| fabric {name} |", *(f"{gap['sr']:.3f}, {gap['eps_v_pct']:.2f} |" for gap in rms), flush=True)
 
 
 if __name__ == "__main__":

@@ -75,15 +75,20 @@ def lame(shape: str, order: int, points: int | None, size: float) -> tuple[Any, 
     return problem, step
 
 
+def lame_stress(radius: np.ndarray) -> np.ndarray:
+    """Return the exact (n, 6) stress, compression positive."""
+    exact = np.zeros((len(radius), 6))
+    exact[:, 0], exact[:, 2] = -(1.0 - 4.0 / radius**2) / 3.0, -(1.0 + 4.0 / radius**2) / 3.0
+    exact[:, 1] = 0.3 * (exact[:, 0] + exact[:, 2])
+    return exact
+
+
 def true_error(problem: Any, step: Increment) -> float:
     """Return the true error in the energy norm, over that of the exact stress, with the element's richest rule."""
     space = problem.model.space
     fine = build_space(space.mesh, space.kinematics, max(space.mesh.element.rules))
     elastic = elastic_tangents(problem.model.zones, step.states, space.npoints)[0]
-    radius = fine.points[:, 0]
-    exact = np.zeros((fine.npoints, 6))
-    exact[:, 0], exact[:, 2] = -(1.0 - 4.0 / radius**2) / 3.0, -(1.0 + 4.0 / radius**2) / 3.0
-    exact[:, 1] = 0.3 * (exact[:, 0] + exact[:, 2])
+    exact = lame_stress(fine.points[:, 0])
     there = np.broadcast_to(elastic, (fine.npoints, 6, 6))
     gap = energy_density(exact - fine.strain(step.displacement) @ elastic.T, there) @ fine.weights
     return float(np.sqrt(gap / (energy_density(exact, there) @ fine.weights)))
@@ -101,6 +106,15 @@ def test_the_recovered_stress_tells_the_error_of_the_mesh(shape: str, order: int
         assert 0.85 < problem.mesh_error.value(step) / errors[-1] < 1.25
         assert 0.5 < np.sqrt(np.mean(problem.mesh_error.field(step) ** 2)) / errors[-1] < 2.0
     assert np.log2(errors[1] / errors[2]) == pytest.approx(order, abs=0.2)
+
+
+def test_the_points_of_the_reduced_rule_are_better_by_an_order() -> None:
+    errors = []
+    for size in (0.25, 0.125, 0.0625):
+        problem, step = lame("quad", 2, None, size)
+        exact = lame_stress(problem.model.space.points[:, 0])
+        errors.append(np.abs(step.states["all"].stress - exact).max())
+    assert np.log2(errors[1] / errors[2]) == pytest.approx(3.0, abs=0.2)
 
 
 @pytest.mark.parametrize("cell_type", ["triangle", "triangle6", "quad", "quad8", "quad9", "tetra10", "hexahedron20"])
