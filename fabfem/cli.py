@@ -192,7 +192,9 @@ def _umat_commands(commands: argparse._SubParsersAction, common: argparse.Argume
     export.add_argument("--case", type=Path, metavar="CASE.toml", help="case that has the material")
     export.add_argument("--directions", default="bazant_oh_37", metavar="NAME", help="contact directions of a sand")
     export.add_argument("--units", default="kN,m", metavar="FORCE,LENGTH", help="units of a sand (default: kN,m)")
-    export.add_argument("--cpu", default="host", metavar="NAME", help="processor, as LLVM names it (default: this one)")
+    export.add_argument(
+        "--cpu", default="host", metavar="NAME", help="processor: host, generic, x86-64-v2 … v4 (default: host)"
+    )
     export.set_defaults(command=_export_umat)
 
 

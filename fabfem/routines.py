@@ -72,7 +72,7 @@ def export(material: str, library: Path, case: Path | None, rule: str, units: st
     rule, units : str
         Contact directions and units, such as ``kN,m``, of a sand without a case.
     cpu : str
-        Processor, as LLVM names it.
+        Processor that the code is for; see `umat.export.export_umat`.
 
     Raises
     ------

@@ -110,6 +110,7 @@ WORDS = {
     "sand": (["export-umat", "--material", "toyora", "--out", "x.so"], "did you mean 'toyoura'?"),
     "units": (["export-umat", "--material", "toyoura", "--out", "x.so", "--units", "kN"], "--units: 'kN' is not"),
     "folder": (["export-umat", "--material", "toyoura", "--out", "none/x.so"], "there is no folder 'none'"),
+    "processor": (["export-umat", "--material", "toyoura", "--out", "x.so", "--cpu", "i8088"], "no processor 'i8088'"),
     "rule": (
         ["export-umat", "--material", "toyoura", "--out", "x.so", "--directions", "lebedev_4"],
         "there is no Lebedev rule of degree 4",

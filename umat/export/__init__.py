@@ -27,19 +27,19 @@ def export_umat(material: ChangHicher, directions: Directions, library: Path, cp
     library : Path
         The file to write.
     cpu : str
-        Processor that the code is for, as LLVM names it: the one of this machine, or such as ``x86-64-v3``.
+        Processor that the code is for: ``host``, the one of this machine, ``generic``, or ``x86-64-v2`` to ``-v4``.
 
     Raises
     ------
     ValueError
-        If the directions are mirrored, there is no linker, or it fails.
+        If the directions are mirrored, the processor is unknown, there is no linker, or it fails.
     """
     from umat.export.library import check_tools, write
     from umat.export.point import entry_point
 
     if directions.symmetry != "half":
         raise ValueError("a library needs directions on half the sphere: it does not know the plane of symmetry")
-    check_tools()
+    check_tools(cpu)
     layout = layout_of(material, directions)
     write(entry_point(material, directions, layout), layout, Path(library), cpu)
     return layout

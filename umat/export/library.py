@@ -31,12 +31,15 @@ INTEGERS = ("NTENS", "NSTATV", "NPROPS")
 REDUCTION = 0.5
 """Factor on PNEWDT of a refused point."""
 RELEASE = "NRT_MemInfo_call_dtor"
+LEVELS = ("x86-64-v2", "x86-64-v3", "x86-64-v4")
+"""Levels of x86-64 processors: up to SSE 4.2, up to AVX2, up to AVX-512."""
 LINKERS = ("cc", "gcc", "clang")
 BYTE, WORD, LONG, REAL = ir.IntType(8), ir.IntType(32), ir.IntType(64), ir.DoubleType()
 
 
-def check_tools() -> None:
+def check_tools(cpu: str) -> None:
     """Raise ValueError where no library can be made."""
+    _machine(cpu)
     if not COMPILED:
         raise ValueError("numba's compiler is switched off (NUMBA_DISABLE_JIT); a library needs it")
     _linker()
@@ -68,17 +71,13 @@ def _compiled(entry: EntryPoint) -> Any:
 def _machine(cpu: str) -> Any:
     binding.initialize_all_targets()
     binding.initialize_all_asmprinters()
-    host = cpu == "host"
-    try:
-        return binding.Target.from_default_triple().create_target_machine(
-            cpu=binding.get_host_cpu_name() if host else cpu,
-            features=binding.get_host_cpu_features().flatten() if host else "",
-            opt=3,
-            reloc="pic",
-            codemodel="default",
-        )
-    except RuntimeError as error:
-        raise ValueError(f"LLVM knows no processor '{cpu}' ({error})") from error
+    target, host = binding.Target.from_default_triple(), cpu == "host"
+    known = ("host", "generic", *(LEVELS if target.triple.startswith("x86_64") else ()))
+    if cpu not in known:  # LLVM would end the process
+        raise ValueError(f"there is no processor '{cpu}' to write code for; there are {', '.join(known)}")
+    name = binding.get_host_cpu_name() if host else cpu
+    features = binding.get_host_cpu_features().flatten() if host else ""
+    return target.create_target_machine(cpu=name, features=features, opt=3, reloc="pic", codemodel="default")
 
 
 def _entry_code(compiled: Any, entry: EntryPoint, layout: Layout, beside: Any) -> str:
