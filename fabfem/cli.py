@@ -51,10 +51,12 @@ def _fail(message: str, status: int) -> int:
 
 def _solve(options: argparse.Namespace) -> int:
     from fabfem.case import read_case
+    from fabfem.restart import Restart
     from fabfem.run import remember_cost, run_case
 
     case = read_case(options.case)
-    outcome = run_case(case, options.out or Path("results") / options.case.stem, quiet=options.quiet)
+    folder, restart = options.out or Path("results") / options.case.stem, Restart(options.resume, options.branch)
+    outcome = run_case(case, folder, quiet=options.quiet, restart=restart)
     if not options.quiet:
         print(outcome.summary())
     if outcome.status == "completed":
@@ -150,6 +152,9 @@ def _parser() -> argparse.ArgumentParser:
     solve = commands.add_parser("solve", parents=[common], help="run a case and write its results")
     solve.add_argument("case", type=Path, metavar="CASE.toml")
     solve.add_argument("--out", type=Path, metavar="DIR", help="folder of the results (default: results/CASE)")
+    again = solve.add_mutually_exclusive_group()
+    again.add_argument("--resume", action="store_true", help="go on from the last checkpoint in the results, if any")
+    again.add_argument("--branch", type=Path, metavar="DIR", help="begin a new result from the last state in DIR")
     solve.set_defaults(command=_solve)
 
     check = commands.add_parser("check", parents=[common], help="validate a case and say what its scene leaves out")
