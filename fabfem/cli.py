@@ -1,6 +1,7 @@
 """The ``fabfem`` command.
 
-Exit status: 0 done, 1 the pictures could not be drawn or an answer of the verification is wrong, 2 bad input, 3 a run
+Exit status: 0 done, 1 the pictures could not be drawn, an answer of the verification is wrong
+or a replay ends otherwise, 2 bad input, 3 a run
 that could not go on (all that converged is kept), 130 interrupted. Nothing heavy is imported before a command needs it.
 """
 
@@ -132,6 +133,18 @@ def _show(options: argparse.Namespace) -> int:
     return _fail(shown.trouble, NO_PICTURE) if shown.trouble else DONE
 
 
+def _replay(options: argparse.Namespace) -> int:
+    from fabfem.replay import replay
+
+    same = True
+    for found in replay(options.folder):
+        same &= found.same
+        if not options.quiet:
+            how = "the same as then" if found.same else "NOT the same as then"
+            print(str(found.folder), *found.lines, how, "", sep="\n")
+    return DONE if same else RED
+
+
 def _verify(options: argparse.Namespace) -> int:
     from fabfem.verification.problems import chosen
     from fabfem.verification.report import verify
@@ -152,9 +165,9 @@ def _parser() -> argparse.ArgumentParser:
     solve = commands.add_parser("solve", parents=[common], help="run a case and write its results")
     solve.add_argument("case", type=Path, metavar="CASE.toml")
     solve.add_argument("--out", type=Path, metavar="DIR", help="folder of the results (default: results/CASE)")
-    again = solve.add_mutually_exclusive_group()
-    again.add_argument("--resume", action="store_true", help="go on from the last checkpoint in the results, if any")
-    again.add_argument("--branch", type=Path, metavar="DIR", help="begin a new result from the last state in DIR")
+    origin = solve.add_mutually_exclusive_group()
+    origin.add_argument("--resume", action="store_true", help="go on from the last checkpoint in the results, if any")
+    origin.add_argument("--branch", type=Path, metavar="DIR", help="begin a new result from the last state in DIR")
     solve.set_defaults(command=_solve)
 
     check = commands.add_parser("check", parents=[common], help="validate a case and say what its scene leaves out")
@@ -178,6 +191,10 @@ def _parser() -> argparse.ArgumentParser:
     show = commands.add_parser("show", parents=[common], help="draw pictures of a result")
     show.add_argument("folder", type=Path, metavar="DIR")
     show.set_defaults(command=_show)
+
+    again = commands.add_parser("replay", parents=[common], help="run again alone what failed in a run")
+    again.add_argument("folder", type=Path, metavar="DIR", help="a result, or one of the folders in its replay/")
+    again.set_defaults(command=_replay)
 
     verify = commands.add_parser("verify", parents=[common], help="run problems with known answers and compare")
     verify.add_argument("--only", action="append", default=[], metavar="NAME", help="a problem; may be given again")

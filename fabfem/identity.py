@@ -6,6 +6,7 @@ Two runs with the same identity on the same machine give the same numbers to the
 import hashlib
 import json
 from collections.abc import Iterator, Mapping
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +20,7 @@ ASIDE = {"title", "checkpoint", "sweep", "study", "calibration"}
 
 
 def identity(case: Case, **files: str) -> dict[str, Any]:
-    """Return the identity of a run: ``case``, ``version``, the `files` (name -> hash of the content) and the ``hash``."""
+    """Return the identity of a run: ``case``, ``version``, the `files` (name -> hash) and the ``hash`` of all."""
     told = json.loads(json.dumps(case.model_dump(mode="json", exclude_none=True, exclude=ASIDE)))
     found = {"case": told, "version": versions() | {"sources": sources()}, **files}
     return found | {"hash": hashed(json.dumps(found, sort_keys=True).encode())}
@@ -34,6 +35,7 @@ def hashed(*parts: bytes | np.ndarray) -> str:
     return digest.hexdigest()[:16]
 
 
+@cache
 def sources() -> str:
     """Return a hash of the program's own sources, which tells versions under development apart."""
     home = Path(__file__).parent

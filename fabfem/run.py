@@ -69,5 +69,10 @@ def remember_cost(case: Case, folder: Path) -> None:
         scene.remember(case, folder)
 
 
+def replay_case(case: Case, start: Any) -> tuple[tuple[str, float, str] | None, list[str]]:
+    """Return how a case fails after a start (stage, fraction, reason), None if it goes on, and what was tried."""
+    return _scene(case).replay(case, start)
+
+
 def _scene(case: Case) -> Any:
     return import_module(SCENES[case.scene.kind])

@@ -7,13 +7,17 @@ from typing import Any, NamedTuple
 from fabfem.boundary_value.audit import audit, audited
 from fabfem.boundary_value.fields import QUANTITIES
 from fabfem.boundary_value.frame import frame
+from fabfem.boundary_value.meshes import mesh_file
 from fabfem.boundary_value.omitted import remaining
 from fabfem.boundary_value.peaks import Peaks
 from fabfem.boundary_value.probes import Column
 from fabfem.boundary_value.problem import Problem
 from fabfem.boundary_value.safety import safety, write_curve
 from fabfem.boundary_value.stability import localisation
-from fabfem.fem.increment import Collapsed, Cutback, Increment
+from fabfem.failures import clear as clear_failures
+from fabfem.failures import keep_points, keep_stage
+from fabfem.fem.increment import Collapsed, Cutback, Increment, Stopped
+from fabfem.fem.start import Start
 from fabfem.output.checkpoints import PATTERN as CHECKPOINTS
 from fabfem.output.checkpoints import Checkpoint, Checkpoints
 from fabfem.output.history import History
@@ -52,8 +56,15 @@ class Recorder:
     """All that a run writes."""
 
     def __init__(
-        self, problem: Problem, folder: Path, timer: Timer, identity: dict[str, Any], written: Written | None = None
+        self,
+        problem: Problem,
+        folder: Path,
+        timer: Timer,
+        identity: dict[str, Any],
+        start: Start | None = None,
+        written: Written | None = None,
     ) -> None:
+        self._start = start
         self.problem, self.folder, self.timer, self.identity = problem, folder, timer, identity
         then = written or Written()
         headers = [column.header for column in problem.columns]
@@ -81,6 +92,7 @@ class Recorder:
             self.row = tuple(column.value(increment) for column in self.problem.columns)
             self.history.write(self.row)
             self._last, self._pending = increment, None
+            keep_points(self.problem.case, self.folder, increment.cutbacks)
             output = self.problem.case.output
             if output and (increment.number % output.every == 0 or increment.fraction >= 1.0):
                 self._store()
@@ -109,6 +121,13 @@ class Recorder:
             write_curve(self.folder / "strength_reduction.csv", end, self.problem.case.units.length)
             if self.fields and end.failing and self.problem.case.output:
                 self.fields.write(frame(self.problem, self.problem.case.output, end.failing))
+
+    def stopped(self, end: Stopped) -> None:
+        """Write what it takes to run again alone what a run could not get through."""
+        self.timer.add(end.timings)
+        case, resume = self.problem.case, self._last.resume if self._last else self._start
+        keep_points(case, self.folder, end.cutbacks)
+        keep_stage(case, self.folder, resume, (end.stage, end.fraction, end.reason), mesh_file(case))
 
     def end(self, status: str, reason: str, cutbacks: tuple[Cutback, ...] = ()) -> tuple[str, str]:
         """Store the last increment and a checkpoint, say how the run ended, close, and return status and reason."""
@@ -142,7 +161,9 @@ class Recorder:
         content = {name: entry for name, entry in self.report.content.items() if name not in self._standing}
         time = {**self.timer.spent, "total": self.timer.total()}
         peaks = self._peaks.memory()
-        return Written(self.history.size, fields, content, self.row, peaks, self._stored, self._unstored(), keepers, time)
+        return Written(
+            self.history.size, fields, content, self.row, peaks, self._stored, self._unstored(), keepers, time
+        )
 
     def _unstored(self) -> Frame | None:
         """Return the fields of the last increment where they are not stored yet."""
@@ -214,6 +235,8 @@ def _field_files(problem: Problem, folder: Path, stored: Sequence[tuple[float, s
 
 def _clear(folder: Path, kept: Sequence[str], resumed: bool) -> None:
     """Remove the results and pictures of an earlier run, or what it has that is later than its checkpoint."""
+    if not resumed:
+        clear_failures(folder)
     later = ("fields_*.vtu", "strength_reduction.csv", "*.png", ".*.part")
     for pattern in later if resumed else (*later, "fields.pvd", "report.json", CHECKPOINTS):
         for file in folder.glob(pattern):

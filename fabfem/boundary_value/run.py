@@ -79,9 +79,18 @@ def run(
     return Outcome(status, reason, folder, len(recorder.report.content["increments"]), last, timer.total())
 
 
-def _steps(
-    problem: Problem, begun: Checkpoint | None, restart: Restart
-) -> Iterator[Increment | Stopped | Collapsed]:
+def replay(case: BoundaryValueCase, start: Any) -> tuple[tuple[str, float, str] | None, list[str]]:
+    """Return how the next increment after a start fails (stage, fraction, reason), None if not, and a line a try."""
+    step = next(march(build(case).model, start))
+    assert not isinstance(step, Collapsed)
+    tries = [
+        f"  increment of {100 * cut.size:.4g} %: {cut.reason}; residuals {' '.join(f'{r:.1e}' for r in cut.residuals)}"
+        for cut in step.cutbacks
+    ]
+    return (step.stage, step.fraction, step.reason) if isinstance(step, Stopped) else None, tries
+
+
+def _steps(problem: Problem, begun: Checkpoint | None, restart: Restart) -> Iterator[Increment | Stopped | Collapsed]:
     """Return the march from a checkpoint; `CaseError` where the case cannot go on from it."""
     start = begun.start if begun else None
     why = misfit(problem.model, start) if start else ""
@@ -99,11 +108,11 @@ def _recorder(
     restart: Restart,
 ) -> Recorder:
     if begun is None or restart.branch is None:
-        return Recorder(problem, folder, timer, known, Written(**begun.written) if begun else None)
+        return Recorder(problem, folder, timer, known, *((begun.start, Written(**begun.written)) if begun else ()))
     gathering = [column.name for column in problem.columns if column.keeper]
     if set(gathering) - set(begun.written["keepers"]):
         raise CaseError(f"{problem.case.path.name}: errors: {restart.branch} has not gathered {', '.join(gathering)}")
-    recorder = Recorder(problem, folder, timer, known)
+    recorder = Recorder(problem, folder, timer, known, begun.start)
     recall(problem.columns, begun.written["keepers"])
     start = begun.start
     told = {"folder": str(restart.branch), "stage": start.stage, "increment": start.number}
@@ -124,7 +133,7 @@ def _drive(steps: Iterator[Increment | Stopped | Collapsed], recorder: Recorder,
     try:
         for step in steps:
             if isinstance(step, Stopped):
-                recorder.timer.add(step.timings)
+                recorder.stopped(step)
                 return recorder.end("stopped", _why(step, recorder.problem), step.cutbacks)
             if isinstance(step, Collapsed):
                 return _found(step, recorder, shown)

@@ -180,7 +180,7 @@ def _tried(
         forces = load.total(factor), load.on_soil(factor)
         if isinstance(solved.end, Trial):
             return Step(solved, target, size, *forces, cutbacks), factor
-        cutbacks += (Cutback(stage.name, fraction, size, *solved.end),)
+        cutbacks += (Cutback(stage.name, fraction, size, *solved.end, solved.residuals),)
         size *= 0.5
         if size < stage.smallest:
             return Step(solved, target, size, *forces, cutbacks), factor

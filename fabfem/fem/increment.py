@@ -28,6 +28,8 @@ class Cutback:
     """Worst point, -1 where no point is to blame."""
     refused: Refused | None = None
     """The point alone, where its material refused it."""
+    residuals: tuple[float, ...] = ()
+    """Relative residual of every trial."""
 
 
 @dataclass(frozen=True)

@@ -178,7 +178,7 @@ def _cutback(place: Place, new: Try) -> Cutback:
     refusal = new.answer.end
     assert isinstance(refusal, Refusal)
     reason = f"strength divided by {new.factor:g}: {refusal.reason}"
-    return Cutback(place.stage.name, 0.0, 0.0, reason, refusal.point, refusal.refused)
+    return Cutback(place.stage.name, 0.0, 0.0, reason, refusal.point, refusal.refused, new.answer.residuals)
 
 
 def _verdict(bracket: Bracket, failed: Try | None) -> tuple[str, str]:

@@ -64,8 +64,8 @@ class Progress(NamedTuple):
 def march(model: Model, start: Start | None = None) -> Iterator[Increment | Stopped | Collapsed]:
     """Iterate over the converged increments of all stages; a `Stopped` ends a run that cannot go on.
 
-    A `Collapsed` ends a stage that searched for the factor of safety, and the run with it. With `start`, the `resume` of
-    an increment of an earlier march, it goes on after that increment, to the last bit as that march did. Raises
+    A `Collapsed` ends a stage that searched for the factor of safety, and the run with it. With `start`, the `resume`
+    of an increment of an earlier march, it goes on after that increment, to the last bit as that march did. Raises
     ValueError where a stage is impossible or `start` does not fit the model.
     """
     if start is not None and (why := misfit(model, start)):
@@ -132,9 +132,7 @@ def _water(model: Model, stage: Stage, pattern: Pattern) -> Water | None:
     return water_of(model.space, pattern, model.water, stage.drainage == "seepage", stage.duration)
 
 
-def _all_stages(
-    model: Model, systems: list[System], start: Start | None
-) -> Iterator[Increment | Stopped | Collapsed]:
+def _all_stages(model: Model, systems: list[System], start: Start | None) -> Iterator[Increment | Stopped | Collapsed]:
     space = model.space
     now = Equilibrium(np.zeros(space.ndof), model.states, np.zeros(space.ndof), np.zeros((0, 6, 6)))
     number, time = (start.number, start.time) if start else (0, 0.0)
@@ -186,9 +184,7 @@ def _through(place: Place, system: System, now: Equilibrium, load: Loading) -> C
         trial = step.solved.end
         if isinstance(trial, Refusal):
             timings = system.timer.since(spent)
-            yield Stopped(
-                stage.name, place.stage_index, at.fraction, trial.reason, trial.point, step.cutbacks, timings
-            )
+            yield Stopped(stage.name, place.stage_index, at.fraction, trial.reason, trial.point, step.cutbacks, timings)
             return None, number
         number, old = number + 1, now
         now, at = advanced(old, trial), _gone_on(stage, system, at, old, step, trial, pace)
@@ -218,11 +214,15 @@ def _tried(stage: Stage, system: System, load: Loading, now: Equilibrium, at: Pr
         solved = solve_increment(system, now, forces, size, guess)
         answer = solved.end
         may_shrink = 0.5 * size >= stage.smallest
-        if isinstance(answer, Trial) and may_shrink and pace.error(flowed, now.displacement, answer.step, size) > TOO_FAST:
+        if (
+            isinstance(answer, Trial)
+            and may_shrink
+            and pace.error(flowed, now.displacement, answer.step, size) > TOO_FAST
+        ):
             answer = Refusal("the pore pressure changes faster than the time step can follow")
         if isinstance(answer, Trial):
             return Step(solved, target, size, forces, load.on_soil(target), cutbacks)
-        cutbacks += (Cutback(stage.name, fraction, size, *answer),)
+        cutbacks += (Cutback(stage.name, fraction, size, *answer, solved.residuals),)
         size, guess = 0.5 * size, None
         if size < stage.smallest:
             return Step(solved._replace(end=answer), target, size, forces, forces, cutbacks)

@@ -1,8 +1,8 @@
 """Where a march can be taken up again: everything that its next increment depends on, as one value.
 
-The matrices, the solver and its analysis are made anew from the model; only what came out of the increments is kept: the
-last equilibrium, and what the stage had come to (the size to try next, the displacement that carries the last increment
-on, the load factor, the bracket of a search).
+The matrices, the solver and its analysis are made anew from the model; only what came out of the increments is kept:
+the last equilibrium, and what the stage had come to (the size to try next, the displacement that carries the last
+increment on, the load factor, the bracket of a search).
 """
 
 from typing import Any, NamedTuple

@@ -55,7 +55,7 @@ def read_archive(path: Path) -> Any:
 
 def _packed(value: Any, arrays: dict[str, np.ndarray]) -> Any:
     """Return plain values that stand for a value, and put its arrays aside."""
-    if value is None or isinstance(value, bool | int | float | str) and not isinstance(value, np.generic):
+    if value is None or (isinstance(value, bool | int | float | str) and not isinstance(value, np.generic)):
         return value
     if isinstance(value, np.ndarray | np.generic):
         name = f"a{len(arrays)}"

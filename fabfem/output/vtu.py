@@ -55,7 +55,7 @@ class Frame(NamedTuple):
 
 
 class FieldFiles:
-    """The ``.vtu`` files of a run and the collection that lists them; `stored` are those of an earlier run to go on from."""
+    """The ``.vtu`` files of a run and the collection that lists them; `stored` are those of an earlier run."""
 
     def __init__(
         self,
