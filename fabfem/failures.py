@@ -1,6 +1,6 @@
-"""What failed, as small folders in ``replay/`` of a result: all it takes to run it again alone (`fabfem.replay`).
+"""What failed, as small folders in ``replay/`` of a result: what it takes to run it alone (`fabfem.replay`).
 
-``point_000`` and on: a point that its material refused, with its state, strain increment, parameters and directions; the
+``point_000`` and on: a point that its material refused, with state, strain increment, parameters and directions; the
 last five are kept. ``stage``: where a run stopped, with the case, the mesh and the state before.
 """
 

@@ -6,6 +6,7 @@ done in a process that does nothing else. Arithmetic differs from the compiled k
 
 import sys
 from collections.abc import Callable
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -41,12 +42,12 @@ def watched(judge: Callable[..., int], tell: Callable[[str], None]) -> Callable[
 def main(file: Path) -> None:
     """Print the local iteration of the point in a file and its status."""
     import umat
-    from umat.chang_hicher import integrate
     from umat.status import message
 
+    integrate = import_module("umat.chang_hicher.integrate")  # the package has a function of that name
     point = read_archive(file).refused
     print(HEAD)
-    integrate.judge = watched(integrate.judge, print)
+    integrate.judge = watched(integrate.judge, print)  # type: ignore[attr-defined]
     response = umat.update(point.material, point.directions, point.strain_increment, point.state)
     print(f"  status {int(response.status[0])}, {message(int(response.status[0]))}")
 

@@ -109,3 +109,22 @@ SCENES = {
     ),
     "solid": scene(METAL, **SOLID),
 }
+
+
+def element(material: dict[str, Any], *stages: dict[str, Any], **more: Any) -> dict[str, Any]:
+    """Return the tables of an element test: compression to 100, then further stages."""
+    alone = {key: value for key, value in material.items() if key != "unit_weight"}
+    first = {"name": "more", "kind": "isotropic", "to": 100.0, "increments": 10}
+    tables = {"scene": {"kind": "element"}, "material": {"soil": alone}, "initial": {"p": 50.0}}
+    return tables | {"stage": [first, *stages]} | more
+
+
+SHEAR = {"name": "shear", "kind": "triaxial", "drainage": "drained", "shear_strain": 0.02, "increments": 20}
+CYCLES = SHEAR | {"name": "again", "drainage": "undrained", "shear_strain": [0.001, -0.001], "cycles": 2}
+PROBES = {"name": "probes", "kind": "probe", "of": "stress", "size": 1.0, "directions": 12}
+ROSES = {"output": {"roses": {"stage": "shear", "strain": [0.0, 0.005]}}}
+ELEMENTS = {
+    "elastic": element(ELASTIC, SHEAR),
+    "mohr_coulomb": element(MOHR, SHEAR, CYCLES),
+    "chang_hicher": element(SAND | FABRIC, SHEAR, PROBES, SHEAR | {"name": "on", "keep_strain": True}, **ROSES),
+}

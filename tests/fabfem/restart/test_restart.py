@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 from restart_kills import content, killed
-from restart_scenes import GROUND, MOHR, OTHER, SCENES, pushed, scene
+from restart_scenes import CYCLES, ELEMENTS, GROUND, MOHR, OTHER, SCENES, pushed, scene
 
 from fabfem.case import CaseError, read_case
 from fabfem.case.toml import write_toml
@@ -49,6 +49,37 @@ def test_every_checkpoint_of_a_run_leads_to_its_end(name: str, tmp_path: Path, m
                 later.unlink()
         run_case(case, tmp_path / "out", quiet=True, restart=Restart(resume=True))
         assert content(tmp_path / "out") == whole, file.name
+
+
+@pytest.mark.parametrize("name", ELEMENTS)
+def test_a_killed_element_test_goes_on_from_its_last_stage(name: str, tmp_path: Path) -> None:
+    case = written(tmp_path, ELEMENTS[name])
+    whole = run_case(case, tmp_path / "whole", quiet=True)
+    assert whole.status == "completed", whole.reason
+    chance = random.Random(name)
+    killed(case, tmp_path / "torn", chance.randrange(12, 28), chance)
+    outcome = run_case(case, tmp_path / "torn", quiet=True, restart=Restart(resume=True))
+    assert (outcome.status, outcome.increments) == ("completed", whole.increments)
+    assert content(tmp_path / "torn") == content(tmp_path / "whole")
+    run_case(case, tmp_path / "torn", quiet=True, restart=Restart(resume=True))
+    assert content(tmp_path / "torn") == content(tmp_path / "whole")
+    further = ELEMENTS[name] | {"stage": [*ELEMENTS[name]["stage"], CYCLES | {"name": "further"}]}
+    branch = Restart(branch=tmp_path / "whole")
+    outcome = run_case(written(tmp_path, further, "further.toml"), tmp_path / "branch", quiet=True, restart=branch)
+    assert outcome.status == "completed"
+    assert {line.split(",")[0] for line in rows_of(tmp_path / "branch")} == {"further"}
+
+
+def test_a_killed_run_of_fabric_laws_is_run_again(tmp_path: Path) -> None:
+    case = Path(__file__).parents[3] / "cases" / "fabric" / "yuan_13_creation.toml"
+    run_case(case, tmp_path / "whole", quiet=True)
+    killed(case, tmp_path / "torn", 5, random.Random(1))
+    run_case(case, tmp_path / "torn", quiet=True, restart=Restart(resume=True))
+    assert content(tmp_path / "torn") == content(tmp_path / "whole")
+
+
+def rows_of(folder: Path) -> list[str]:
+    return (folder / "history.csv").read_text().splitlines()[1:]
 
 
 @pytest.fixture
