@@ -125,6 +125,6 @@ PROBES = {"name": "probes", "kind": "probe", "of": "stress", "size": 1.0, "direc
 ROSES = {"output": {"roses": {"stage": "shear", "strain": [0.0, 0.005]}}}
 ELEMENTS = {
     "elastic": element(ELASTIC, SHEAR),
-    "mohr_coulomb": element(MOHR, SHEAR, CYCLES),
+    "von_mises": element(METAL, SHEAR, CYCLES),
     "chang_hicher": element(SAND | FABRIC, SHEAR, PROBES, SHEAR | {"name": "on", "keep_strain": True}, **ROSES),
 }
