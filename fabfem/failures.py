@@ -7,12 +7,14 @@ last five are kept. ``stage``: where a run stopped, with the case, the mesh and 
 import shutil
 from collections.abc import Iterable
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from fabfem.case import Case
-from fabfem.fem.increment import Cutback
-from fabfem.fem.model import Refused
 from fabfem.output.archive import write_archive
+
+if TYPE_CHECKING:  # an element test imports nothing of the finite elements
+    from fabfem.fem.increment import Cutback
+    from fabfem.fem.model import Refused
 
 FOLDER, FILE = "replay", "failure.npz"
 KEPT = 5
@@ -30,7 +32,7 @@ class PointFailure(NamedTuple):
     size: float
     """Size of the increment, as a fraction of the stage."""
     reason: str
-    refused: Refused
+    refused: "Refused"
 
 
 class StageFailure(NamedTuple):
@@ -48,7 +50,7 @@ class StageFailure(NamedTuple):
     reason: str
 
 
-def keep_points(case: Case, folder: Path, cutbacks: Iterable[Cutback]) -> None:
+def keep_points(case: Case, folder: Path, cutbacks: "Iterable[Cutback]") -> None:
     """Write the refused points of some cut-backs; the last five of a result are kept."""
     for cutback in cutbacks:
         if cutback.refused is not None:
