@@ -36,6 +36,19 @@ def test_killed_and_resumed_to_the_last_bit(name: str, tmp_path: Path) -> None:
     assert content(tmp_path / "torn") == content(tmp_path / "whole")
 
 
+def test_killed_again_and_again(tmp_path: Path) -> None:
+    """Each life of the run is killed some increments further on, the last one not."""
+    case = written(tmp_path, SCENES["consolidation"])
+    whole = run_case(case, tmp_path / "whole", quiet=True)
+    chance, lives = random.Random(2), 0
+    for row in (4, 13, 21, 34):
+        lives += killed(case, tmp_path / "torn", row, chance, "--resume")
+    assert lives >= 2, "the run was over before it could be killed"
+    assert run_case(case, tmp_path / "torn", quiet=True, restart=Restart(resume=True)).status == "completed"
+    assert whole.increments == len(rows_of(tmp_path / "torn"))
+    assert content(tmp_path / "torn") == content(tmp_path / "whole")
+
+
 @pytest.mark.parametrize("name", SCENES)
 def test_every_checkpoint_of_a_run_leads_to_its_end(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """All checkpoints are kept, and the run resumed from every third."""
