@@ -1,8 +1,8 @@
 """The ``fabfem`` command.
 
-Exit status: 0 done, 1 the pictures could not be drawn, an answer of the verification is wrong or a UMAT breaks its
-contract, 2 bad input, 3 a run that could not go on (all that converged is kept), 130 interrupted. Nothing heavy is
-imported before a command needs it.
+Exit status: 0 done, 1 the pictures could not be drawn, an answer of the verification is wrong, a replay ends otherwise
+or a UMAT breaks its contract, 2 bad input, 3 a run that could not go on (all that converged is kept), 130 interrupted.
+Nothing heavy is imported before a command needs it.
 """
 
 import argparse
@@ -52,10 +52,12 @@ def _fail(message: str, status: int) -> int:
 
 def _solve(options: argparse.Namespace) -> int:
     from fabfem.case import read_case
+    from fabfem.restart import Restart
     from fabfem.run import remember_cost, run_case
 
     case = read_case(options.case)
-    outcome = run_case(case, options.out or Path("results") / options.case.stem, quiet=options.quiet)
+    folder, restart = options.out or Path("results") / options.case.stem, Restart(options.resume, options.branch)
+    outcome = run_case(case, folder, quiet=options.quiet, restart=restart)
     if not options.quiet:
         print(outcome.summary())
     if outcome.status == "completed":
@@ -145,6 +147,18 @@ def _gallery(options: argparse.Namespace) -> int:
     return DONE if all(one.status == RIGHT for one in shown) else STOPPED
 
 
+def _replay(options: argparse.Namespace) -> int:
+    from fabfem.replay import replay
+
+    same = True
+    for found in replay(options.folder):
+        same &= found.same
+        if not options.quiet:
+            how = "the same as then" if found.same else "NOT the same as then"
+            print(str(found.folder), *found.lines, how, "", sep="\n")
+    return DONE if same else RED
+
+
 def _verify(options: argparse.Namespace) -> int:
     from fabfem.verification.problems import chosen
     from fabfem.verification.report import verify
@@ -211,6 +225,9 @@ def _parser() -> argparse.ArgumentParser:
     solve = commands.add_parser("solve", parents=[common], help="run a case and write its results")
     solve.add_argument("case", type=Path, metavar="CASE.toml")
     solve.add_argument("--out", type=Path, metavar="DIR", help="folder of the results (default: results/CASE)")
+    origin = solve.add_mutually_exclusive_group()
+    origin.add_argument("--resume", action="store_true", help="go on from the last checkpoint in the results, if any")
+    origin.add_argument("--branch", type=Path, metavar="DIR", help="begin a new result from the last state in DIR")
     solve.set_defaults(command=_solve)
 
     check = commands.add_parser("check", parents=[common], help="validate a case and say what its scene leaves out")
@@ -244,6 +261,10 @@ def _parser() -> argparse.ArgumentParser:
     )
     gallery.add_argument("--pictures", type=Path, metavar="DIR", help="folder that gets a copy of every picture")
     gallery.set_defaults(command=_gallery)
+
+    again = commands.add_parser("replay", parents=[common], help="run again alone what failed in a run")
+    again.add_argument("folder", type=Path, metavar="DIR", help="a result, or one of the folders in its replay/")
+    again.set_defaults(command=_replay)
 
     verify = commands.add_parser("verify", parents=[common], help="run problems with known answers and compare")
     verify.add_argument("--only", action="append", default=[], metavar="NAME", help="a problem; may be given again")

@@ -19,7 +19,7 @@ import numpy as np
 from scipy.sparse import csr_matrix
 
 import umat
-from fabfem.boundary_value.probes import Column, Value
+from fabfem.boundary_value.probes import Column, Keeper, Value
 from fabfem.case import BoundaryValueCase, CaseError
 from fabfem.fem.model import Model, Zone, elastic_tangents
 from fabfem.fem.recovery import energy_density, fine_space, nearest, recovery, stress_within
@@ -85,6 +85,14 @@ class Integration:
         self.total += float(np.sqrt(self.weights @ (increment.local_error * size) ** 2)) / whole if whole else 0.0
         return self.total
 
+    def memory(self) -> float:
+        """Return the sum so far."""
+        return self.total
+
+    def recall(self, memory: float) -> None:
+        """Go on from a sum."""
+        self.total = memory
+
 
 class _Sampled(NamedTuple):
     """Some points of a zone under the second rule."""
@@ -105,23 +113,31 @@ class Directions:
         self.sampled = {name: _sampled(zone, seconds[name], model, samples) for name, zone in _spread(model, seconds)}
         self.states = {name: _started(sampled) for name, sampled in self.sampled.items()}
         self.alive = {name: np.ones(len(sampled.ids), bool) for name, sampled in self.sampled.items()}
-        self._last: Increment | None = None
+        self._last: tuple[int, Array] | None = None
 
     def value(self, increment: Increment) -> Value:
         """Return the distance of the stresses by the two rules; nothing where the second refused all points."""
         strain = self.model.space.strain(increment.displacement - self._before(increment))
-        self._last = increment
+        self._last = increment.stage_index, increment.displacement
         followed = [self._follow(name, strain, increment) for name in self.sampled]
         gaps, stress = (np.concatenate(part) for part in zip(*followed, strict=True))
         return float(np.sqrt(np.sum(gaps**2) / np.sum(stress**2))) if stress.any() else ""
 
     def _before(self, increment: Increment) -> Array:
         """Return the displacement from which an increment set out."""
-        last = self._last
-        if last is None:
+        if self._last is None:
             return np.zeros(self.model.space.ndof)
-        moved_on = last.stage_index != increment.stage_index
-        return last.displacement * (not (moved_on and self.model.stages[last.stage_index].zero_displacement))
+        stage_index, displacement = self._last
+        moved_on = stage_index != increment.stage_index
+        return displacement * (not (moved_on and self.model.stages[stage_index].zero_displacement))
+
+    def memory(self) -> Any:
+        """Return the states of the samples, which of them are still followed, and the last increment."""
+        return self.states, self.alive, self._last
+
+    def recall(self, memory: Any) -> None:
+        """Go on from what an earlier run had gathered."""
+        self.states, self.alive, self._last = memory
 
     def _follow(self, name: str, strain: Array, increment: Increment) -> tuple[Array, Array]:
         """Lead the samples of a zone on; return the distance of the stresses and the size of the first."""
@@ -156,14 +172,18 @@ def error_columns(
     if said is None:
         return (), None
     mesh = Discretisation(model)
-    makers: dict[str, Callable[[], Callable[[Increment], Value]]] = {
-        "equilibrium": lambda: lambda increment: increment.residuals[-1] + increment.drag,
-        "integration": lambda: Integration(model).value,
-        "discretisation": lambda: mesh.value,
-        "directions": lambda: Directions(model, _seconds(case, second), said.samples).value,
+    makers: dict[str, Callable[[], tuple[Callable[[Increment], Value], Keeper | None]]] = {
+        "equilibrium": lambda: (lambda increment: increment.residuals[-1] + increment.drag, None),
+        "integration": lambda: _kept(Integration(model)),
+        "discretisation": lambda: (mesh.value, None),
+        "directions": lambda: _kept(Directions(model, _seconds(case, second), said.samples)),
     }
-    columns = tuple(Column(f"error_{name}", "-", "error", makers[name]()) for name in said.estimate)
+    columns = tuple(Column(f"error_{name}", "-", "error", *makers[name]()) for name in said.estimate)
     return columns, mesh if "discretisation" in said.estimate else None
+
+
+def _kept(error: Integration | Directions) -> tuple[Callable[[Increment], Value], Keeper]:
+    return error.value, error
 
 
 def _seconds(case: BoundaryValueCase, second: Callable[[str], Mapping[str, Substance]]) -> Mapping[str, Substance]:

@@ -37,6 +37,14 @@ def mesh_of(case: BoundaryValueCase) -> Mesh:
     return read_mesh(case.locate(said.file), said.order)
 
 
+def mesh_file(case: BoundaryValueCase) -> Path | None:
+    """Return the file of the mesh that a case names, drawn by now; None for a box."""
+    said = case.mesh
+    if said.script is not None:
+        return drawn(case.locate(said.script), said.parameters)
+    return None if said.file is None else case.locate(said.file)
+
+
 def mesh_place(case: BoundaryValueCase) -> str:
     """Return the place in the case that the mesh comes from."""
     return next(f"mesh.{key}" for key in ("box", "script", "file") if getattr(case.mesh, key) is not None)

@@ -28,6 +28,14 @@ class Peaks:
             entry["last"] = value
             entry["last_over_peak"] = value / entry["peak"] if entry["peak"] else 1.0
 
+    def memory(self) -> list[tuple[tuple[int, str], dict[str, Any]]]:
+        """Return all entries with their keys."""
+        return list(self._found.items())
+
+    def recall(self, memory: list[tuple[tuple[int, str], dict[str, Any]]]) -> None:
+        """Go on from the entries of an earlier run."""
+        self._found = {key: dict(entry) for key, entry in memory}
+
     def content(self) -> list[dict[str, Any]]:
         """Return an entry for each stage and force."""
         return list(self._found.values())

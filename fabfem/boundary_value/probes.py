@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterator, Sequence
 from math import prod
-from typing import NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +18,16 @@ Value = str | int | float
 Measure = Callable[[Increment], float]
 
 
+class Keeper(Protocol):
+    """What adds up from row to row."""
+
+    def memory(self) -> Any:
+        """Return all that it has gathered; a value that an archive can hold."""
+
+    def recall(self, memory: Any) -> None:
+        """Take what an earlier run had gathered."""
+
+
 class Column(NamedTuple):
     """A column of the history."""
 
@@ -29,6 +39,8 @@ class Column(NamedTuple):
     """``probe``, ``reaction`` or ``derived``, empty for what every history has."""
     value: Callable[[Increment], Value]
     """The entry of an increment's row."""
+    keeper: Keeper | None = None
+    """What adds up from row to row, where something does."""
 
     @property
     def header(self) -> str:

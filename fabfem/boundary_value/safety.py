@@ -1,6 +1,5 @@
 """What a search for the factor of safety leaves: the report's entry and the curve of displacement against factor."""
 
-from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +10,7 @@ from fabfem.output.history import History
 def safety(end: Collapsed) -> dict[str, Any]:
     """Return the report's entry on the factor of safety."""
     kept = ("stage", "last_equilibrium", "first_failure", "verdict", "reason")
-    return {name: asdict(end)[name] for name in kept} | {"tried": [factor._asdict() for factor in end.tried]}
+    return {name: getattr(end, name) for name in kept} | {"tried": [factor._asdict() for factor in end.tried]}
 
 
 def sentence(end: Collapsed) -> str:

@@ -4,13 +4,14 @@ from functools import singledispatch
 from pathlib import Path
 from typing import Any
 
-from fabfem.case import FabricCase
+from fabfem.case import CaseError, FabricCase
 from fabfem.case import fabric as said
 from fabfem.fabric_tests.drives import Measured, Value
 from fabfem.outcome import Description, Outcome, make_folder, short
 from fabfem.output.history import History
 from fabfem.output.interrupt import held_back
 from fabfem.output.report import Report
+from fabfem.restart import FRESH, Restart
 from fabfem.timing import Timer
 
 PHASES = ("laws", "output")
@@ -56,8 +57,13 @@ def describe(case: FabricCase) -> Description:
     return Description(OMITTED, measure(case.drive, case).remains)
 
 
-def run(case: FabricCase, folder: Path, quiet: bool, timer: Timer | None = None) -> Outcome:
-    """Run a case and write its results into a folder; see `fabfem.run.run_case`."""
+def run(case: FabricCase, folder: Path, quiet: bool, timer: Timer | None = None, restart: Restart = FRESH) -> Outcome:
+    """Run a case and write its results into a folder; see `fabfem.run.run_case`.
+
+    Such a run takes seconds and keeps no checkpoints: to resume it is to run it again, which gives the same.
+    """
+    if restart.branch is not None:
+        raise CaseError(f"{case.path.name}: scene.kind: a fabric scene keeps no state to branch from")
     timer = timer or Timer(PHASES)
     with timer.phase("laws"):
         measured = measure(case.drive, case)

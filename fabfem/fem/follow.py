@@ -47,26 +47,39 @@ class Reached(NamedTuple):
     """Displacement of the last increment."""
 
 
+class Progress(NamedTuple):
+    """What a stage whose load is found has come to."""
+
+    load_factor: float
+    last: np.ndarray | None
+    """(ndof,) displacement of the last increment."""
+    fraction: float
+    size: float
+    """Size to try next."""
+
+
 def through(
     place: Place, system: System, now: Equilibrium, load: Loading
 ) -> Generator[Increment | Stopped, None, tuple[Equilibrium | None, int]]:
     """Yield the increments of a stage; return its last equilibrium, None where it stopped, and their number so far."""
     stage, number = place.stage, place.number
     equation = control(stage.goal, system.space)
-    reached, fraction, size = Reached(now, 0.0, None), 0.0, stage.first
+    factor, last, fraction, size = place.progress or Progress(0.0, None, 0.0, stage.first)
+    reached = Reached(now, factor, last)
     while fraction < 1.0:
         spent = dict(system.timer.spent)
         step, factor = _tried(place, system, load, equation, reached, fraction, size)
         trial = step.solved.end
         timings = system.timer.since(spent)
         if isinstance(trial, Refusal):
-            yield Stopped(stage.name, place.stage_index, fraction, *trial, step.cutbacks, timings)
+            yield Stopped(stage.name, place.stage_index, fraction, trial.reason, trial.point, step.cutbacks, timings)
             return None, number
         number, fraction, old = number + 1, step.fraction, reached.now
         reached = Reached(advanced(old, trial), factor, trial.step)
-        yield increment(place, number, system, old, reached.now, step, trial, timings, load_factor=factor)
         easy = step.solved.iterations <= system.controls.easy and not step.cutbacks
         size = min(step.size * (system.controls.growth if easy else 1.0), stage.largest)
+        at = Progress(factor, trial.step, fraction, size)
+        yield increment(place, number, system, old, reached.now, step, trial, timings, at, load_factor=factor)
     return reached.now, number
 
 
@@ -89,7 +102,7 @@ def _tried(
         forces = load.total(factor), load.on_soil(factor)
         if isinstance(solved.end, Trial):
             return Step(solved, target, size, *forces, cutbacks), factor
-        cutbacks += (Cutback(stage.name, fraction, size, *solved.end),)
+        cutbacks += (Cutback(stage.name, fraction, size, *solved.end, solved.residuals),)
         size *= 0.5
         if size < stage.smallest:
             return Step(solved, target, size, *forces, cutbacks), factor

@@ -2,14 +2,15 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from fabfem.fem.linear import norm
-from fabfem.fem.model import States, Zone
+from fabfem.fem.model import Refused, States, Zone
 from fabfem.fem.newton import Solved
 from fabfem.fem.stages import Stage
+from fabfem.fem.start import Start
 from fabfem.fem.trial import Equilibrium, System, Trial, begun, mechanical, relative
 
 
@@ -25,6 +26,10 @@ class Cutback:
     reason: str
     point: int
     """Worst point, -1 where no point is to blame."""
+    refused: Refused | None = None
+    """The point alone, where its material refused it."""
+    residuals: tuple[float, ...] = ()
+    """Relative residual of every trial."""
 
 
 @dataclass(frozen=True)
@@ -75,6 +80,8 @@ class Increment:
     """States where the increment began."""
     tangent: np.ndarray
     """(npoints, 6, 6) consistent tangent at its end; zero where there is no zone."""
+    resume: Start
+    """Where a march can be taken up after it."""
     strength: float = 1.0
     """Factor by which the strength is divided."""
     load_factor: float = 1.0
@@ -143,12 +150,18 @@ class Collapsed:
 
 
 class Place(NamedTuple):
-    """A stage, and the increments and time before it."""
+    """A stage, what was before it, and where in it a march is taken up."""
 
     stage: Stage
     stage_index: int
     number: int
+    """Increments so far."""
     time: float
+    """Time when the stage begins."""
+    origin: np.ndarray
+    """(ndof,) internal force of the skeleton when the stage begins."""
+    progress: Any = None
+    """What an earlier march has come to in the stage; None at its beginning."""
 
 
 class Step(NamedTuple):
@@ -183,10 +196,11 @@ def increment(
     step: Step,
     trial: Trial,
     timings: dict[str, float],
+    progress: Any,
     strength: float | None = None,
     load_factor: float | None = None,
 ) -> Increment:
-    """The record of an increment from `old` to `now`."""
+    """The record of an increment from `old` to `now`, after which the course has come to `progress`."""
     force = begun(system, old, step.size)
     start = norm(mechanical(system, system.constraints.collect(step.load - force)))
     return Increment(
@@ -215,6 +229,7 @@ def increment(
         step=trial.step,
         before=old.states,
         tangent=trial.batch.tangent,
+        resume=Start(place.stage.name, place.stage_index, number, place.time, now, place.origin, progress),
         strength=place.stage.strength if strength is None else strength,
         load_factor=step.fraction if load_factor is None else load_factor,
     )

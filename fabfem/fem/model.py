@@ -110,11 +110,27 @@ def symmetric(zones: Mapping[str, Zone]) -> bool:
     return all(symmetric_tangent(zone.material) for zone in zones.values())
 
 
+class Refused(NamedTuple):
+    """A point that its material refused, with all that its answer depends on."""
+
+    zone: str
+    point: int
+    material: Any
+    directions: Any
+    state: Any
+    """State of one point, before."""
+    strain_increment: np.ndarray
+    """(1, 6)"""
+    status: int
+
+
 class Refusal(NamedTuple):
     """Why something could not be done, and at which point (-1: no point in particular)."""
 
     reason: str
     point: int = -1
+    refused: Refused | None = None
+    """The point alone, where a material refused it."""
 
 
 class Batch(NamedTuple):
@@ -155,8 +171,11 @@ def update_points(
         refused = np.flatnonzero(response.status)
         held += len(refused)
         if held > may_hold * npoints:
-            point = int(np.arange(npoints)[zone.points][refused[0]])
-            return Refusal(f"{len(refused)} points of zone '{name}': {message(response.status[refused[0]])}", point)
+            first = refused[:1]
+            point, code = int(np.arange(npoints)[zone.points][first[0]]), int(response.status[first[0]])
+            strain, state = strain_increment[zone.points][first], type(old[name])(*(part[first] for part in old[name]))
+            alone = Refused(name, point, zone.material, zone.directions, state, strain, code)
+            return Refusal(f"{len(refused)} points of zone '{name}': {message(code)}", point, alone)
         stress[zone.points], tangent[zone.points] = response.stress, response.tangent
         if len(refused):
             points = np.arange(npoints)[zone.points][refused]

@@ -12,6 +12,8 @@ Mises, tan φ_μ of Chang–Hicher, hence its tan φ_p = (e_c/e) tan φ_μ and t
 from collections.abc import Generator, Mapping
 from typing import NamedTuple
 
+import numpy as np
+
 from fabfem.fem.flow import EQUILIBRIUM, Flow, elastic_displacement, flow
 from fabfem.fem.increment import Collapsed, Cutback, Factor, Increment, Place, Step, advanced, increment, largest
 from fabfem.fem.loads import Loading
@@ -54,6 +56,17 @@ class Bracket(NamedTuple):
         return Bracket(factor, self.high if self.high is not None and self.high > factor else None, False)
 
 
+class Search(NamedTuple):
+    """What a search has come to."""
+
+    bracket: Bracket
+    start: np.ndarray
+    """(ndof,) displacement where it began."""
+    enough: float
+    """Displacement beyond which a steady flow is a failure [length]."""
+    tried: tuple[Factor, ...] = ()
+
+
 class Try(NamedTuple):
     """What came of a factor."""
 
@@ -78,12 +91,11 @@ def through(
     place: Place, system: System, now: Equilibrium, load: Loading
 ) -> Generator[Increment | Collapsed, None, tuple[None, int]]:
     """Yield the equilibria found on the way to the factor of safety, then how the search ended."""
-    goal, number, start = place.stage.goal, place.number, now
+    goal, number = place.stage.goal, place.number
     assert isinstance(goal, StrengthSearch)
-    enough = goal.growth * elastic_displacement(system, now, load.total(1.0))
-    bracket, cutbacks = Bracket(None, None, False), tuple[Cutback, ...]()
-    failed: Try | None = None
-    tried: tuple[Factor, ...] = ()
+    bracket, start, enough, tried = place.progress or _search(system, goal, now, load)
+    cutbacks: tuple[Cutback, ...] = ()
+    failed: Try | None = None  # after an equilibrium a search ends with another failure, or with none
     spent = dict(system.timer.spent)
     while not bracket.closed(goal):
         factor = bracket.target(goal, place.stage.strength)
@@ -93,7 +105,8 @@ def through(
         tried += (_entry(new, system, start, now),)
         if stands:
             number += 1
-            reached = _recorded(place, number, new, now, load, cutbacks, system.timer.since(spent))
+            search = Search(bracket, start, enough, tried)
+            reached = _recorded(place, number, new, now, load, cutbacks, system.timer.since(spent), search)
             now, cutbacks, spent = _rest(new, now), (), dict(system.timer.spent)
             yield reached
         else:
@@ -101,7 +114,7 @@ def through(
             cutbacks += (_cutback(place, new),)
     flowing = None
     if failed and failed.trial and bracket.high is not None:
-        flowing = _recorded(place, number + 1, failed, now, load, (), {})
+        flowing = _recorded(place, number + 1, failed, now, load, (), {}, None)
     verdict, reason = _verdict(bracket, failed)
     timings = system.timer.since(spent)
     yield Collapsed(
@@ -109,6 +122,12 @@ def through(
         timings=timings,
     )
     return None, number
+
+
+def _search(system: System, goal: StrengthSearch, now: Equilibrium, load: Loading) -> Search:
+    """A search that begins."""
+    enough = goal.growth * elastic_displacement(system, now, load.total(1.0))
+    return Search(Bracket(None, None, False), now.displacement, enough)
 
 
 def _attempted(place: Place, system: System, now: Equilibrium, load: Loading, factor: float, enough: float) -> Try:
@@ -128,10 +147,10 @@ def _rest(new: Try, now: Equilibrium) -> Equilibrium:
     return advanced(now, new.answer.end)
 
 
-def _entry(new: Try, system: System, start: Equilibrium, now: Equilibrium) -> Factor:
+def _entry(new: Try, system: System, start: np.ndarray, now: Equilibrium) -> Factor:
     end = _rest(new, now)
     drag = new.fluent.drag if new.fluent and new.verdict != EQUILIBRIUM else 0.0
-    return Factor(new.factor, new.verdict, largest(system, end.displacement - start.displacement), drag)
+    return Factor(new.factor, new.verdict, largest(system, end.displacement - start), drag)
 
 
 def _recorded(
@@ -142,6 +161,7 @@ def _recorded(
     load: Loading,
     cutbacks: tuple[Cutback, ...],
     timings: Mapping[str, float],
+    search: Search | None,
 ) -> Increment:
     """The record of the increment that a factor ended with; a flow counts as one increment."""
     goal, trial, end = place.stage.goal, new.trial, _rest(new, now)
@@ -151,14 +171,14 @@ def _recorded(
     step = Step(new.answer, fraction, goal.step, load.total(1.0), load.on_soil(1.0), cutbacks)
     begun = new.fluent.old if new.fluent and new.verdict != EQUILIBRIUM else now
     whole = trial._replace(step=end.displacement - begun.displacement)
-    return increment(place, number, new.system, begun, end, step, whole, dict(timings), new.factor, 1.0)
+    return increment(place, number, new.system, begun, end, step, whole, dict(timings), search, new.factor, 1.0)
 
 
 def _cutback(place: Place, new: Try) -> Cutback:
-    assert isinstance(new.answer.end, Refusal)
-    return Cutback(
-        place.stage.name, 0.0, 0.0, f"strength divided by {new.factor:g}: {new.answer.end.reason}", new.answer.end.point
-    )
+    refusal = new.answer.end
+    assert isinstance(refusal, Refusal)
+    reason = f"strength divided by {new.factor:g}: {refusal.reason}"
+    return Cutback(place.stage.name, 0.0, 0.0, reason, refusal.point, refusal.refused, new.answer.residuals)
 
 
 def _verdict(bracket: Bracket, failed: Try | None) -> tuple[str, str]:

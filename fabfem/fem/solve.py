@@ -7,6 +7,7 @@ without one, the fraction of its loads and motions.
 
 from collections.abc import Generator, Iterator, Mapping
 from importlib import import_module
+from typing import NamedTuple
 
 import numpy as np
 
@@ -26,15 +27,16 @@ from fabfem.fem.linear import make_solver
 from fabfem.fem.loads import Loading, loading
 from fabfem.fem.model import Controls, Model, Refusal, Zone, elastic_tangents, stress_of, symmetric, weaken
 from fabfem.fem.newton import solve_increment
-from fabfem.fem.pores import Pace, PorousSpace, Water, water_of
+from fabfem.fem.pores import Flowed, Pace, PorousSpace, Water, water_of
 from fabfem.fem.reduction import reduction
 from fabfem.fem.space import Space
 from fabfem.fem.stages import ArcLength, DisplacementControl, Stage, StrengthSearch
+from fabfem.fem.start import Start, misfit
 from fabfem.fem.supports import constrain
 from fabfem.fem.trial import PHASES, Equilibrium, System, Trial
 from fabfem.timing import Timer
 
-__all__ = ["Collapsed", "Cutback", "Factor", "Increment", "Stopped", "march", "reaction"]
+__all__ = ["Collapsed", "Cutback", "Factor", "Increment", "Start", "Stopped", "march", "reaction"]
 
 COURSES = {
     StrengthSearch: "fabfem.fem.safety",
@@ -49,12 +51,26 @@ TOO_FAST = 4.0
 Course = Generator[Increment | Stopped | Collapsed, None, tuple[Equilibrium | None, int]]
 
 
-def march(model: Model) -> Iterator[Increment | Stopped | Collapsed]:
+class Progress(NamedTuple):
+    """What a stage without a goal has come to."""
+
+    fraction: float
+    size: float
+    """Size to try next."""
+    guess: np.ndarray | None = None
+    """(ndof,) displacement increment to start from."""
+    flowed: Flowed = Flowed()
+
+
+def march(model: Model, start: Start | None = None) -> Iterator[Increment | Stopped | Collapsed]:
     """Iterate over the converged increments of all stages; a `Stopped` ends a run that cannot go on.
 
-    A `Collapsed` ends a stage that searched for the factor of safety, and the run with it. Raises ValueError where a
-    stage is impossible.
+    A `Collapsed` ends a stage that searched for the factor of safety, and the run with it. With `start`, the `resume`
+    of an increment of an earlier march, it goes on after that increment, to the last bit as that march did. Raises
+    ValueError where a stage is impossible or `start` does not fit the model.
     """
+    if start is not None and (why := misfit(model, start)):
+        raise ValueError(f"the march cannot be taken up at this start: {why}.")
     space = model.space
     pattern = find_pattern(space.dofs, space.ndof)
     elastic = stiffness(space, pattern, elastic_tangents(model.zones, model.states, space.npoints))
@@ -63,7 +79,7 @@ def march(model: Model) -> Iterator[Increment | Stopped | Collapsed]:
     for stage in model.stages:
         zones = changed(zones, stage)
         systems.append(_system(model, stage, zones, *shared))
-    return _all_stages(model, systems)
+    return _all_stages(model, systems, start)
 
 
 def reaction(space: Space, increment: Increment, boundary: str, component: str) -> float:
@@ -117,17 +133,22 @@ def _water(model: Model, stage: Stage, pattern: Pattern) -> Water | None:
     return water_of(model.space, pattern, model.water, stage.drainage == "seepage", stage.duration)
 
 
-def _all_stages(model: Model, systems: list[System]) -> Iterator[Increment | Stopped | Collapsed]:
+def _all_stages(model: Model, systems: list[System], start: Start | None) -> Iterator[Increment | Stopped | Collapsed]:
     space = model.space
     now = Equilibrium(np.zeros(space.ndof), model.states, np.zeros(space.ndof), np.zeros((0, 6, 6)))
-    number, time = 0, 0.0
-    for index, (stage, system) in enumerate(zip(model.stages, systems, strict=True)):
-        try:
-            now = _begun(now, stage, system)
-        except ValueError as error:
-            yield Stopped(stage.name, index, 0.0, f"a zone cannot change its material: {error}", -1, (), {})
-            return
-        reached, number = yield from _course(Place(stage, index, number, time), system, now)
+    number, time = (start.number, start.time) if start else (0, 0.0)
+    done = start.stage_index if start else 0
+    for index, (stage, system) in enumerate(zip(model.stages[done:], systems[done:], strict=True), done):
+        if start and index == done:
+            now, place = start.now, Place(stage, index, number, time, start.origin, start.progress)
+        else:
+            try:
+                now = _begun(now, stage, system)
+            except ValueError as error:
+                yield Stopped(stage.name, index, 0.0, f"a zone cannot change its material: {error}", -1, (), {})
+                return
+            place = Place(stage, index, number, time, now.force)
+        reached, number = yield from _course(place, system, now)
         if reached is None:
             return
         now = reached
@@ -148,7 +169,7 @@ def _course(place: Place, system: System, now: Equilibrium) -> Course:
     """The way through a stage that its goal asks for."""
     load = loading(system.space, place.stage.loads)
     if place.stage.released:
-        load = load.released(system.constraints.keep_unknown(now.force - load.total(0.0)))
+        load = load.released(system.constraints.keep_unknown(place.origin - load.total(0.0)))
     if place.stage.goal is None:
         return _through(place, system, now, load)
     return import_module(COURSES[type(place.stage.goal)]).through(place, system, now, load)
@@ -156,37 +177,36 @@ def _course(place: Place, system: System, now: Equilibrium) -> Course:
 
 def _through(place: Place, system: System, now: Equilibrium, load: Loading) -> Course:
     """Yield the increments of a stage; return its last equilibrium, None where it stopped, and their number so far."""
-    stage, fraction, size, number = place.stage, 0.0, place.stage.first, place.number
-    guess, pace = None, Pace(system.water, stage.time_tolerance)
-    while fraction < 1.0:
+    stage, number = place.stage, place.number
+    pace, at = Pace(system.water, stage.time_tolerance), place.progress or Progress(0.0, stage.first)
+    while at.fraction < 1.0:
         spent = dict(system.timer.spent)
-        step = _tried(stage, system, load, now, fraction, size, guess, pace)
+        step = _tried(stage, system, load, now, at, pace)
         trial = step.solved.end
         if isinstance(trial, Refusal):
             timings = system.timer.since(spent)
-            yield Stopped(stage.name, place.stage_index, fraction, *trial, step.cutbacks, timings)
+            yield Stopped(stage.name, place.stage_index, at.fraction, trial.reason, trial.point, step.cutbacks, timings)
             return None, number
-        number, fraction, old = number + 1, step.fraction, now
-        now = advanced(old, trial)
-        yield increment(place, number, system, old, now, step, trial, system.timer.since(spent))
-        size = _next_size(stage, system.controls, step, pace.error(old.displacement, trial.step, step.size))
-        pace.keep(old.displacement, trial.step, step.size)
-        guess = _extrapolated(system, trial.step, step.size, min(size, 1.0 - fraction))
+        number, old = number + 1, now
+        now, at = advanced(old, trial), _gone_on(stage, system, at, old, step, trial, pace)
+        yield increment(place, number, system, old, now, step, trial, system.timer.since(spent), at)
     return now, number
 
 
-def _tried(
-    stage: Stage,
-    system: System,
-    load: Loading,
-    now: Equilibrium,
-    fraction: float,
-    size: float,
-    guess: np.ndarray | None,
-    pace: Pace,
-) -> Step:
-    """The increment after `fraction`, made smaller until it converges or its size is below the stage's smallest."""
+def _gone_on(
+    stage: Stage, system: System, at: Progress, old: Equilibrium, step: Step, trial: Trial, pace: Pace
+) -> Progress:
+    """What the stage has come to after an increment from `old`."""
+    last = old.displacement, trial.step, step.size
+    size = _next_size(stage, system.controls, step, pace.error(at.flowed, *last))
+    guess = _extrapolated(system, trial.step, step.size, min(size, 1.0 - step.fraction))
+    return Progress(step.fraction, size, guess, pace.after(at.flowed, *last))
+
+
+def _tried(stage: Stage, system: System, load: Loading, now: Equilibrium, at: Progress, pace: Pace) -> Step:
+    """The next increment, made smaller until it converges or its size is below the stage's smallest."""
     cutbacks: tuple[Cutback, ...] = ()
+    fraction, size, guess, flowed = at
     end = next(mark for mark in stage.marks if mark > fraction + 1e-9)
     while True:
         target = fraction + size if fraction + 1.001 * size < end else end
@@ -195,11 +215,15 @@ def _tried(
         solved = solve_increment(system, now, forces, size, guess)
         answer = solved.end
         may_shrink = 0.5 * size >= stage.smallest
-        if isinstance(answer, Trial) and may_shrink and pace.error(now.displacement, answer.step, size) > TOO_FAST:
+        if (
+            isinstance(answer, Trial)
+            and may_shrink
+            and pace.error(flowed, now.displacement, answer.step, size) > TOO_FAST
+        ):
             answer = Refusal("the pore pressure changes faster than the time step can follow")
         if isinstance(answer, Trial):
             return Step(solved, target, size, forces, load.on_soil(target), cutbacks)
-        cutbacks += (Cutback(stage.name, fraction, size, *answer),)
+        cutbacks += (Cutback(stage.name, fraction, size, *answer, solved.residuals),)
         size, guess = 0.5 * size, None
         if size < stage.smallest:
             return Step(solved._replace(end=answer), target, size, forces, forces, cutbacks)

@@ -45,8 +45,13 @@ def responses(specimen: Specimen, stage: Probe, state: Any) -> Iterator[tuple[fl
 class ProbeFile:
     """The table of all probes of a run."""
 
-    def __init__(self, folder: Path, stress_unit: str) -> None:
-        self._table = History(folder / "probes.csv", headers(stress_unit))
+    def __init__(self, folder: Path, stress_unit: str, kept: int = 0) -> None:
+        self._table = History(folder / "probes.csv", headers(stress_unit), kept)
+
+    @property
+    def size(self) -> int:
+        """Size of the table so far [bytes]."""
+        return self._table.size
 
     def write(self, specimen: Specimen, stage: Probe, state: Any) -> int:
         """Write the probes of a stage and return how many were carried to their end."""

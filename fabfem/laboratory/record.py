@@ -1,41 +1,75 @@
 """All that an element test writes, as it goes on: the history, the report, directional distributions."""
 
+from collections.abc import Mapping, Sequence
 from pathlib import Path as File
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 import umat
 from fabfem.case.element import Path, Probe
+from fabfem.failures import clear as clear_failures
 from fabfem.laboratory.columns import COMPONENTS, Row, zeta
 from fabfem.laboratory.landmarks import Rows, interpolated, landmarks
 from fabfem.laboratory.probes import ProbeFile
 from fabfem.laboratory.roses import RoseFiles
 from fabfem.laboratory.specimen import Specimen
 from fabfem.laboratory.stages import End, Point
+from fabfem.output.checkpoints import PATTERN as CHECKPOINTS
+from fabfem.output.checkpoints import Checkpoint, Checkpoints
 from fabfem.output.history import History
 from fabfem.output.report import Report
 from fabfem.timing import Timer
 from umat import mandel, measures
-from umat.mandel import FACTOR
+from umat.mandel import FACTOR, Array
 
 PHASES = ("read", "material", "paths", "output")
 STANDING = ("stage", "increment [-]", "fraction [-]")
 
 
+class Reached(NamedTuple):
+    """Where a stage begins."""
+
+    number: int
+    """Number of the stage, from 0."""
+    state: Any
+    strain: Array
+    """(6,) at the end of the stage before."""
+
+
+class Written(NamedTuple):
+    """What the files of a run have come to, for a checkpoint."""
+
+    history: int = 0
+    probes: int = 0
+    """Sizes of the tables [bytes]."""
+    roses: Any = None
+    stages: Sequence[Any] = ()
+    """The report's entries."""
+    values: tuple[Any, ...] = ()
+    increments: int = 0
+    wall_time: Mapping[str, float] = {}
+
+
 class Recorder:
     """All that an element test writes."""
 
-    def __init__(self, specimen: Specimen, folder: File, timer: Timer) -> None:
-        self.specimen, self.folder, self.timer = specimen, folder, timer
-        _clear(folder)
+    def __init__(
+        self, specimen: Specimen, folder: File, timer: Timer, identity: dict[str, Any], written: Written | None = None
+    ) -> None:
+        self.specimen, self.folder, self.timer, self.identity = specimen, folder, timer, identity
+        then = written or Written()
         self.headers = [*STANDING, *(column.header for column in specimen.columns)]
-        self.history = History(folder / "history.csv", self.headers)
+        self.history = History(folder / "history.csv", self.headers, then.history)
+        _clear(folder, [name for _, name in then.roses[2]] if then.roses else [], bool(written))
         self.report = Report(folder / "report.json", **_head(specimen))
-        self.roses = _roses(specimen, folder)
-        self.probes: ProbeFile | None = None
-        self.values: tuple[Any, ...] = ()
-        self.count = 0
+        self.report.content["stages"] = list(then.stages)
+        self.roses = _roses(specimen, folder, then.roses)
+        self.probes = ProbeFile(folder, _stress_unit(specimen), then.probes) if then.probes else None
+        self.values: tuple[Any, ...] = then.values
+        self.count = then.increments
+        timer.resume(then.wall_time, then.wall_time.get("total", 0.0))
+        self._checkpoints = Checkpoints(folder, 0.0)
         self._rows: list[Row] = []
         self._first = 0
 
@@ -86,13 +120,21 @@ class Recorder:
 
     def probe(self, stage: Probe, state: Any) -> None:
         """Run the probes of a stage and write them."""
-        self.probes = self.probes or ProbeFile(self.folder, self.specimen.case.unit_system.label("stress"))
+        self.probes = self.probes or ProbeFile(self.folder, _stress_unit(self.specimen))
         ends = self.probes.write(self.specimen, stage, state)
         reason = "" if ends == stage.directions else f"{stage.directions - ends} of the probes were refused"
         self.report.content["stages"].append(
             {"name": stage.name, "kind": "probe", "status": "completed", "reason": reason, "probes": ends}
         )
         self._write()
+
+    def keep(self, reached: Reached) -> None:
+        """Write a checkpoint where a stage begins."""
+        probes, roses = self.probes.size if self.probes else 0, self.roses.memory() if self.roses else None
+        time = {**self.timer.spent, "total": self.timer.total()}
+        stages = tuple(self.report.content["stages"])
+        written = Written(self.history.size, probes, roses, stages, self.values, self.count, time)
+        self._checkpoints.write(reached.number, Checkpoint(self.identity, reached, written._asdict()))
 
     def end(self, status: str, reason: str) -> tuple[str, str]:
         """Say how the run ended, close, and return status and reason."""
@@ -166,16 +208,25 @@ def _head(specimen: Specimen) -> dict[str, Any]:
     }
 
 
-def _roses(specimen: Specimen, folder: File) -> RoseFiles | None:
+def _stress_unit(specimen: Specimen) -> str:
+    return specimen.case.unit_system.label("stress")
+
+
+def _roses(specimen: Specimen, folder: File, kept: Any) -> RoseFiles | None:
     asked = specimen.case.output.roses
     if asked is None:
         return None
     last = [stage.name for stage in specimen.case.stage if isinstance(stage, Path)][-1]
-    return RoseFiles(folder, asked, asked.stage or last)
+    return RoseFiles(folder, asked, asked.stage or last, kept)
 
 
-def _clear(folder: File) -> None:
-    """Remove the results and pictures of an earlier run."""
-    for pattern in ("fields_*.vtu", "fields.pvd", "history.csv", "roses.csv", "probes.csv", "report.json", "*.png"):
+def _clear(folder: File, kept: Sequence[str], resumed: bool) -> None:
+    """Remove the results and pictures of an earlier run, or what it has that is later than its checkpoint."""
+    later = ("fields_*.vtu", "*.png", ".*.part")
+    first = ("fields.pvd", "roses.csv", "probes.csv", "report.json", CHECKPOINTS)
+    if not resumed:
+        clear_failures(folder)
+    for pattern in later if resumed else (*later, *first):
         for file in folder.glob(pattern):
-            file.unlink()
+            if file.name not in kept:
+                file.unlink()

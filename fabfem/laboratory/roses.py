@@ -32,14 +32,24 @@ SPHERE = (36, 72)
 """Bands from pole to pole and around the surface."""
 
 
+Taken = tuple[int, int, tuple[tuple[float, str], ...]]
+"""States taken, size of the table [bytes], time and file of the surfaces stored."""
+
+
 class RoseFiles:
     """The diagrams and surfaces of a run."""
 
-    def __init__(self, folder: Path, asked: Roses, stage: str) -> None:
-        self.asked, self.stage, self._taken = asked, stage, 0
-        self._table = History(folder / "roses.csv", HEADERS)
+    def __init__(self, folder: Path, asked: Roses, stage: str, kept: Taken | None = None) -> None:
+        self.asked, self.stage = asked, stage
+        self._taken, size, stored = kept if kept else (0, 0, ())
+        self._table = History(folder / "roses.csv", HEADERS, size)
         self._normals, cells = sphere(*SPHERE)
-        self._files = FieldFiles(folder, self._normals, cells, "triangle", "radius 4 pi E(n) of the contact directions")
+        note = "radius 4 pi E(n) of the contact directions"
+        self._files = FieldFiles(folder, self._normals, cells, "triangle", note, stored)
+
+    def memory(self) -> Taken:
+        """Return what an earlier run hands on: states taken, size of the table, surfaces stored."""
+        return self._taken, self._table.size, tuple(self._files.stored)
 
     def offer(self, specimen: Any, state: Any, stage: str, increment: int, strain: float) -> None:
         """Store the distributions of a state if the case asks for this one."""
