@@ -103,9 +103,7 @@ def draining(
     }
 
 
-def at_times(
-    answer: Answer, name: str, expected: Mapping[float, float], ratio: float, note: str
-) -> Iterator[Row]:
+def at_times(answer: Answer, name: str, expected: Mapping[float, float], ratio: float, note: str) -> Iterator[Row]:
     """Yield a row for each time T of a table."""
     times, values = _curve(answer, ratio)
     for number, (time, reference) in enumerate(expected.items()):
