@@ -1,11 +1,11 @@
 """What ails a stiffness matrix: its condition, the growth of its pivots, and the motion that it does not resist.
 
-The condition is ‖K‖₁ ‖K⁻¹‖₁, the second norm estimated from solves [Higham & Tisseur 2000]; the matrix is scaled to a unit
-diagonal first, without which a soft zone beside a stiff one, or other units of pressure, would look like an ill condition.
+The condition is ‖K‖₁ ‖K⁻¹‖₁, the second norm estimated from solves [Higham & Tisseur 2000]; the matrix is scaled to a
+unit diagonal first, without which a soft zone beside a stiff one, or pressures in other units, would seem ill conditioned.
 The growth of the pivots is the largest entry of U over that of K [Golub & Van Loan §3.4].
 
-A singular stiffness has a motion without force. Inverse iteration finds it, and what it is says what is missing:
-no stiffness at all (a zone whose tangent is zero), a motion without strain (supports), or one with strain (a mechanism).
+A singular stiffness has a motion without force. Inverse iteration finds it, and what it is says what is missing: any
+stiffness (a zone whose tangent is zero), supports (a motion without strain), or strength (a mechanism).
 """
 
 from typing import NamedTuple
@@ -17,8 +17,12 @@ from scipy.sparse.linalg import LinearOperator, SuperLU, onenormest, splu
 from fabfem.fem.linear import norm
 from fabfem.fem.trial import System
 
-SHIFT = 1e-13
+SHIFT = 1e-15
 """What is added to the unit diagonal so that a singular matrix can be factored."""
+SINGULAR = 1e-14
+"""Resistance of a motion, over that of the diagonal, below which there is none but round-off."""
+POOR = 1e-9
+"""Resistance below which a solution loses more digits than an equilibrium can spare."""
 NOTHING = 1e-14
 """Diagonal entry over the stiffest below which a dof has no stiffness."""
 UNSTRAINED = 1e-6
@@ -51,16 +55,22 @@ def condition(matrix: csr_matrix) -> Condition:
 
 
 def singularity(system: System, matrix: csr_matrix) -> str:
-    """Why a reduced stiffness matrix is singular, in a phrase; empty where it is not, or not finite."""
+    """What ails a reduced stiffness matrix that is singular, or nearly so; empty where it is not, or not finite."""
     if not np.isfinite(matrix.data).all():
         return ""
     idle = _idle(system, matrix)
     if idle:
-        return idle
+        return f"the stiffness matrix is singular: {idle}"
     motion, resistance = _weakest(matrix)
-    if resistance > 1e3 * SHIFT:
+    if resistance > POOR:
         return ""
-    return _named(system, system.constraints.spread(motion))
+    if resistance > SINGULAR:
+        zone = _zone(system, system.constraints.spread(motion))
+        return (
+            f"the stiffness matrix is ill conditioned: a motion of zone '{zone}' meets {resistance:.0e} of the usual "
+            "resistance, from a contrast of stiffness, flat elements, or a volume that can hardly change"
+        )
+    return f"the stiffness matrix is singular: {_named(system, system.constraints.spread(motion))}"
 
 
 def _idle(system: System, matrix: csr_matrix) -> str:

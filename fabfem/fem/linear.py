@@ -18,7 +18,7 @@ POOR = 1e-10
 USELESS = 1e-6
 """Relative residual above which a solution is refused."""
 OVERFLOW = 1e14
-"""Solution over right-hand side, both scaled by the root of the diagonal, above which the matrix is as good as singular."""
+"""Solution over right-hand side, scaled to a unit diagonal, above which the matrix is as good as singular."""
 
 
 def norm(vector: np.ndarray) -> float:

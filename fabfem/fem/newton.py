@@ -166,7 +166,7 @@ def solved(system: System, matrix: csr_matrix, rhs: np.ndarray) -> np.ndarray | 
         if solution.ok:
             return solution.x
         named = singularity(system, reduced)
-    return Refusal(f"the stiffness matrix is singular: {named}" if named else solution.reason)
+    return Refusal(named or solution.reason)
 
 
 def worst_point(system: System, trial: Trial) -> int:

@@ -1,7 +1,7 @@
 """Element paths of the Chang–Hicher model against curves of an independent prototype, one row per cent of strain.
 
-The prototype is another implementation of the same equations, with 384 directions (Gauss 24 × 32) and steps small enough for
-0.5 kPa; here the same directions are taken. The row of a quantity is the one, of all per cents, that is furthest off.
+The prototype is another implementation of the same equations, with 384 directions (Gauss 24 × 32) and steps small
+enough for 0.5 kPa; here the same directions are taken. Of all per cents, a quantity's row is the one furthest off.
 """
 
 from collections.abc import Callable, Iterator

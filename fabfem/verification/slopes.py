@@ -1,6 +1,6 @@
 """Factors of safety of slopes against upper bounds of one rotational mechanism each, associated flow.
 
-A converged answer lies at the bound or a little below it; displacement elements are too strong, so those of a mesh lie above. The
+A converged answer lies at the bound or a little below it; displacement elements are too strong and lie above. The
 vertical cut without friction is known between 3.776 and 3.786 γH/c [Pastor et al. 2000, Lyamin & Sloan 2002]; with
 φ = 20° its bound is 5.5049.
 """
