@@ -1,7 +1,8 @@
 """The ``fabfem`` command.
 
-Exit status: 0 done, 1 the pictures could not be drawn or an answer of the verification is wrong, 2 bad input, 3 a run
-that could not go on (all that converged is kept), 130 interrupted. Nothing heavy is imported before a command needs it.
+Exit status: 0 done, 1 the pictures could not be drawn or an answer of the verification or of an extreme is wrong, 2 bad
+input, 3 a run that could not go on (all that converged is kept), 130 interrupted. Nothing heavy is imported before a
+command needs it.
 """
 
 import argparse
@@ -137,6 +138,12 @@ def _verify(options: argparse.Namespace) -> int:
     return DONE if verify(chosen(options.only), options.json, options.quiet) else RED
 
 
+def _stress(options: argparse.Namespace) -> int:
+    from fabfem.extremes.report import chosen, stress
+
+    return DONE if stress(chosen(options.only), options.json, options.quiet) else RED
+
+
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="fabfem", description="Boundary-value problems in granular soil with an evolving fabric."
@@ -178,4 +185,9 @@ def _parser() -> argparse.ArgumentParser:
     verify.add_argument("--only", action="append", default=[], metavar="NAME", help="a problem; may be given again")
     verify.add_argument("--json", action="store_true", help="print the rows as JSON")
     verify.set_defaults(command=_verify)
+
+    extreme = commands.add_parser("stress", parents=[common], help="push stiff and extreme cases until they break")
+    extreme.add_argument("--only", action="append", default=[], metavar="GROUP", help="a group; may be given again")
+    extreme.add_argument("--json", action="store_true", help="print the rows as JSON")
+    extreme.set_defaults(command=_stress)
     return parser

@@ -5,12 +5,12 @@ from importlib.util import find_spec
 
 import numpy as np
 
-import umat
 from fabfem.extremes.strength import on_sand
 from fabfem.extremes.sweep import Extreme, Found, sweep
 from fabfem.verification.bearing_capacity import soil
 from fabfem.verification.ground import Ground, footing
 from fabfem.verification.scene import Answer, Tables, solve
+from umat.threads import get_threads, set_threads
 
 
 def extremes() -> Iterator[Extreme]:
@@ -37,11 +37,11 @@ def sand_solvers(surcharge: float) -> Found:
 
 def threads(count: float) -> Found:
     """Return the same for one thread and `count`."""
-    before = umat.get_threads()
+    before = get_threads()
     try:
         return _apart(*(on_sand(1.0, 0.1, {"threads": number}) for number in (1, int(count))))
     finally:
-        umat.set_threads(before)
+        set_threads(before)
 
 
 def again(runs: float) -> Found:

@@ -1,6 +1,6 @@
-"""Extremes of a Chang–Hicher point, Toyoura sand: pressure, density, fabric, increments, directions, units, liquefaction.
+"""Extremes of a Chang–Hicher point: pressure, density, fabric, increments, directions, units, liquefaction.
 
-A point is sheared at constant volume by Δε = (½, 0, −½) times an amount. The reference is the same path in many more
+Toyoura sand is sheared at constant volume by Δε = (½, 0, −½) times an amount. The reference is the same path in many more
 increments, or with many more directions; a refused increment is a refusal. q and p of a state are those of the point.
 """
 
@@ -85,9 +85,7 @@ def units(scale: float) -> Found:
 def liquefied(cycles: float) -> Found:
     """Return 1 if p stays positive and finite through cycles of shear of very loose sand, whose p falls to nothing."""
     sand, rule = toyoura(), directions(RULE)
-    state = umat.initial_state(
-        sand, rule, 100.0 * mandel.IDENTITY[None], void_ratio=1.05, fabric=0.0 * DEPOSIT
-    )
+    state = umat.initial_state(sand, rule, 100.0 * mandel.IDENTITY[None], void_ratio=1.05, fabric=0.0 * DEPOSIT)
     least = np.inf
     for number in range(int(cycles) * 40):
         sign = 1.0 if number % 40 in (*range(10), *range(30, 40)) else -1.0
@@ -116,8 +114,8 @@ def _crossed(share: float) -> Found:
 
 
 def _refined(**start: float) -> Found:
-    """q in 100 increments over that in 400."""
-    return _over(sheared(0.01, 100, **start), sheared(0.01, 400, **start))  # type: ignore[arg-type]
+    """Return q in 100 increments over that in 400."""
+    return _over(sheared(0.01, 100, **start), sheared(0.01, 400, **start))
 
 
 def _over(ours: tuple[float | None, str], reference: tuple[float | None, str]) -> Found:

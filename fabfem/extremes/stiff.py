@@ -1,4 +1,4 @@
-"""Elastic extremes against exact answers: stiffness contrast, flat elements, incompressible skeleton and water, units."""
+"""Elastic extremes against exact answers: stiffness contrast, flat elements, incompressible soil and water, units."""
 
 from collections.abc import Iterator
 from dataclasses import replace

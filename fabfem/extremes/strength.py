@@ -17,11 +17,11 @@ from fabfem.verification.scene import Answer, Tables, held, solve, stage
 
 def extremes() -> Iterator[Extreme]:
     """Yield the sweeps."""
-    yield sweep("weightless footing, surcharge 1: Nq", "φ = ψ [degrees]", (20, 30, 40, 45, 50), friction, 0.1, 45)
-    yield sweep("smooth footing, c = q = 0: Nγ", "φ = ψ [degrees]", (20, 30, 35), bare, 0.05, 35)
+    yield sweep("weightless footing, surcharge 1: Nq", "φ = ψ [degrees]", (30, 45, 50), friction, 0.1, 45)
+    yield sweep("smooth footing, c = q = 0: Nγ", "φ = ψ [degrees]", (20, 30), bare, 0.05, 30)
     sizes = (0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0)
     yield sweep("Hill's tube, p/k = 1.2: u(a)", "increment / load", sizes, increment, 0.01, 0.2, True)
-    lengths = (1.0, 2.0, 4.0, 8.0, 16.0, 64.0, 256.0, 1024.0)
+    lengths = (1.0, 4.0, 16.0, 64.0, 256.0, 1024.0)
     yield sweep("bar that softens: u at the end", "elastic / softening length", lengths, snap_back, 1e-6, 64.0)
     loads = (10.0, 1.0, 0.1, 0.01, 1e-3, 0.0)
     yield sweep("footing on Toyoura sand, B/500 of settlement: load", "surcharge [kPa]", loads, sand, 0.02, 0.1)
@@ -54,7 +54,7 @@ def increment(size: float) -> Found:
 def snap_back(length: float) -> Found:
     """Return the movement of the end of a bar, one part of which has softened to its residual strength.
 
-    Shear stress τ: u = (1 + length) τ/G + γp with τ = τ_r at the end; the bar is `length` times as long as what softens.
+    Shear stress τ: u = (1 + length) τ/G + γp with τ = τ_r at the end; the rest is `length` times as long.
     """
     shear, strength, residual = 1000.0, 10.0, 4.0
     joint_end = 0.04

@@ -1,8 +1,8 @@
 """An extreme: one parameter that is pushed, what came out at each of its values, and where it broke.
 
 At a value the answer is the `same` as the reference within the tolerance, `refused` with a reason, `off` (an answer
-beyond the tolerance) or a `fault` (an exception or a number that is not finite). An extreme is green if everything up to
-the value that is asked for is the same, and what is beyond ends as it may: by refusal only, or by a loss of accuracy
+beyond the tolerance) or a `fault` (an exception or a number that is not finite). An extreme is green if all up to the
+value that is asked for is the same, and what is beyond ends as it may: by refusal only, or by a loss of accuracy
 where the parameter is a resolution, whose error grows with it and is the user's choice.
 """
 
@@ -118,10 +118,10 @@ def sweep(
 def _outcome(value: float, run: Callable[[float], Found], tolerance: float) -> Outcome:
     try:
         got, reference, reason = run(value)
-    except (CaseError, ValueError) as error:
-        return Outcome(value, REFUSED, None, str(error))
-    except Exception as error:  # what a user would see as a traceback is what is looked for here
-        return Outcome(value, FAULT, None, f"{type(error).__name__}: {error}")
+    except (CaseError, ValueError) as refusal:
+        return Outcome(value, REFUSED, None, str(refusal))
+    except Exception as fault:  # what a user would see as a traceback is what is looked for here
+        return Outcome(value, FAULT, None, f"{type(fault).__name__}: {fault}")
     if got is None:
         return Outcome(value, REFUSED if reason else FAULT, None, reason or "refused without a reason")
     if not isfinite(got):

@@ -21,7 +21,7 @@ LAME = PRESSURE * INNER**2 / (OUTER**2 - INNER**2)
 
 
 def rows() -> Iterator[Row]:
-    """Yield displacements and pore pressures for water 100 and 10⁴ times as stiff as the skeleton, and incompressible."""
+    """Yield displacements and pore pressures for water 100 and 10⁴ times as stiff as the skeleton or rigid."""
     for stiffness in (1e2, 1e4, np.inf):
         answer = tube(stiffness)
         name, note = f"K_w/nK = {stiffness:g}", answer.stopped or f"{ACROSS} quad8 across the wall"
