@@ -1,7 +1,7 @@
 """Extremes of a Chang–Hicher point: pressure, density, fabric, increments, directions, units, liquefaction.
 
-Toyoura sand is sheared at constant volume by Δε = (½, 0, −½) times an amount. The reference is the same path in many more
-increments, or with many more directions; a refused increment is a refusal. q and p of a state are those of the point.
+Toyoura sand is sheared at constant volume by Δε = (½, 0, −½) times an amount. The reference is the same path in many
+more increments, or with many more directions; a refused increment is a refusal. q and p of a state are the point's.
 """
 
 from collections.abc import Iterator

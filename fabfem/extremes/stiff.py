@@ -34,11 +34,14 @@ def extremes() -> Iterator[Extreme]:
 
 def layers(contrast: float) -> Found:
     """Return the settlement of four layers under a pressure, every other one `contrast` times as soft."""
-    mesh = grid_mesh("quad", [np.linspace(0.0, 1.0, 5), np.linspace(0.0, 4.0, 17)])
-    place = mesh.points[mesh.cells].mean(axis=1)[:, 1]
-    soft = place % 2.0 < 1.0
-    answer = solve(_two(contrast, pressure=[{"boundary": "top", "value": 1.0}]), _zoned(mesh, soft))
+    answer = solve(two(contrast, pressure=[{"boundary": "top", "value": 1.0}]), stack())
     return Found(answer.final("settlement"), 2.0 * (1.0 + contrast) / _OEDOMETRIC, answer.stopped)
+
+
+def stack() -> Mesh:
+    """Return four layers one high, soft and stiff by turns from the bottom."""
+    mesh = grid_mesh("quad", [np.linspace(0.0, 1.0, 5), np.linspace(0.0, 4.0, 17)])
+    return _zoned(mesh, mesh.points[mesh.cells].mean(axis=1)[:, 1] % 2.0 < 1.0)
 
 
 def columns(contrast: float) -> Found:
@@ -46,7 +49,7 @@ def columns(contrast: float) -> Found:
     mesh = grid_mesh("quad", [np.linspace(0.0, 2.0, 9), np.linspace(0.0, 1.0, 5)])
     soft = mesh.points[mesh.cells].mean(axis=1)[:, 0] < 1.0
     plate = {"boundary": "top", "contact": "smooth", "force": {"y": -1.0}, "motion": {"x": 0.0, "rotation": 0.0}}
-    answer = solve(_two(contrast, ratio=0.0, rigid=[plate]), _zoned(mesh, soft))
+    answer = solve(two(contrast, ratio=0.0, rigid=[plate]), _zoned(mesh, soft))
     return Found(answer.final("settlement"), 1.0 / (1.0 + 1.0 / contrast), answer.stopped)
 
 
@@ -79,8 +82,8 @@ def units(scale: float) -> Found:
 _OEDOMETRIC = (1.0 - 0.3) / ((1.0 + 0.3) * (1.0 - 0.6))
 
 
-def _two(contrast: float, ratio: float = 0.3, **load: list[Tables]) -> Tables:
-    """Tables of a body whose zone "stiff" has E = 1 and whose zone "soft" has less."""
+def two(contrast: float, ratio: float = 0.3, **load: list[Tables]) -> Tables:
+    """Return the tables of a body whose zone "stiff" has E = 1 and whose zone "soft" has less."""
     material = {"model": "elastic", "poisson_ratio": ratio}
     return {
         "scene": {"kind": "boundary_value", "kinematics": "plane_strain"},

@@ -1,7 +1,7 @@
 """What ails a stiffness matrix: its condition, the growth of its pivots, and the motion that it does not resist.
 
 The condition is ‖K‖₁ ‖K⁻¹‖₁, the second norm estimated from solves [Higham & Tisseur 2000]; the matrix is scaled to a
-unit diagonal first, without which a soft zone beside a stiff one, or other units of pressure, would seem ill conditioned.
+unit diagonal first, so that soft zones beside stiff ones, or other units of pressure, do not count.
 The growth of the pivots is the largest entry of U over that of K [Golub & Van Loan §3.4].
 
 A singular stiffness has a motion without force. Inverse iteration finds it, and what it is says what is missing: any

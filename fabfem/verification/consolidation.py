@@ -1,7 +1,8 @@
 """Consolidation: Terzaghi's layer, Mandel's slab and Cryer's sphere, each loaded at once and then left to drain.
 
 Time T = c_v t / H², with c_v = k M / γ_w and M the modulus of one-dimensional compression; H is the drainage path, or
-the radius. Terzaghi's degree of consolidation and Mandel's pressure are series [1923; 1953]; Cryer's peaks are his [1963]. Pressures at stated times are interpolated between the time steps.
+the radius. Terzaghi's degree and Mandel's pressure are series [1923; 1953], the peaks are those of Cryer [1963].
+Pressures at stated times are interpolated between the time steps.
 """
 
 from collections.abc import Iterator, Mapping, Sequence

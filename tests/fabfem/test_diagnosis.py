@@ -9,6 +9,7 @@ from scipy.linalg import hilbert
 from scipy.sparse import csr_matrix
 
 import umat
+from fabfem.extremes import stiff
 from fabfem.fem.assembly import stiffness
 from fabfem.fem.box import box_mesh
 from fabfem.fem.diagnosis import condition, singularity
@@ -20,6 +21,7 @@ from fabfem.fem.solve import Increment, Stopped, march, systems_of
 from fabfem.fem.space import build_space
 from fabfem.fem.stages import Stage
 from fabfem.fem.supports import Support
+from fabfem.verification.scene import solve
 from umat.mandel import IDENTITY
 
 SOLVERS = ["superlu", pytest.param("pardiso", marks=pytest.mark.skipif(not find_spec("pypardiso"), reason="absent"))]
@@ -125,3 +127,16 @@ def test_condition_is_that_of_dense_algebra(n: int) -> None:
         assert found.number == pytest.approx(expected, rel=1e-3)
         assert 0.0 < found.growth <= 2.0
     assert condition(csr_matrix(np.ones((5, 5)))).number > 1e15
+
+
+def test_a_case_records_the_condition() -> None:
+    """Both columns, finite and larger for a stiffer contrast; absent without `diagnose`."""
+    found = {}
+    for contrast in (1.0, 1e4):
+        tables = dict(stiff.two(contrast, pressure=[{"boundary": "top", "value": 1.0}]), solver={"diagnose": True})
+        row = solve(tables, stiff.stack()).history[-1]
+        assert 0.0 < row["pivot_growth"] < 10.0
+        found[contrast] = row["condition_number"]
+    assert 10.0 < found[1.0] < 0.01 * found[1e4] < 1e10
+    plain = solve(stiff.two(1.0, pressure=[{"boundary": "top", "value": 1.0}]), stiff.stack()).history[-1]
+    assert "condition_number" not in plain
