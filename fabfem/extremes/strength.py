@@ -18,7 +18,7 @@ from fabfem.verification.scene import Answer, Tables, held, solve, stage
 def extremes() -> Iterator[Extreme]:
     """Yield the sweeps."""
     yield sweep("weightless footing, surcharge 1: Nq", "φ = ψ [degrees]", (30, 45, 50), friction, 0.1, 45)
-    yield sweep("smooth footing, c = q = 0: Nγ", "φ = ψ [degrees]", (20, 30), bare, 0.05, 30)
+    yield sweep("smooth footing, c = q = 0: Nγ", "φ = ψ [degrees]", (20,), bare, 0.05, 20)
     sizes = (0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0)
     yield sweep("Hill's tube, p/k = 1.2: u(a)", "increment / load", sizes, increment, 0.01, 0.2, True)
     lengths = (1.0, 4.0, 16.0, 64.0, 256.0, 1024.0)
