@@ -1,8 +1,8 @@
 """The ``fabfem`` command.
 
-Exit status: 0 done, 1 the pictures could not be drawn, an answer of the verification is wrong, a replay ends otherwise
-or a UMAT breaks its contract, 2 bad input, 3 a run that could not go on (all that converged is kept), 130 interrupted.
-Nothing heavy is imported before a command needs it.
+Exit status: 0 done, 1 the pictures could not be drawn, an answer of the verification or of an extreme is wrong, a replay
+ends otherwise or a UMAT breaks its contract, 2 bad input, 3 a run that could not go on (all that converged is kept), 130
+interrupted. Nothing heavy is imported before a command needs it.
 """
 
 import argparse
@@ -212,6 +212,12 @@ def _umat_commands(commands: argparse._SubParsersAction, common: argparse.Argume
     export.set_defaults(command=_export_umat)
 
 
+def _stress(options: argparse.Namespace) -> int:
+    from fabfem.extremes.report import chosen, stress
+
+    return DONE if stress(chosen(options.only), options.json, options.quiet) else RED
+
+
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="fabfem", description="Boundary-value problems in granular soil with an evolving fabric."
@@ -271,4 +277,9 @@ def _parser() -> argparse.ArgumentParser:
     verify.add_argument("--json", action="store_true", help="print the rows as JSON")
     verify.set_defaults(command=_verify)
     _umat_commands(commands, common)
+
+    extreme = commands.add_parser("stress", parents=[common], help="push stiff and extreme cases until they break")
+    extreme.add_argument("--only", action="append", default=[], metavar="GROUP", help="a group; may be given again")
+    extreme.add_argument("--json", action="store_true", help="print the rows as JSON")
+    extreme.set_defaults(command=_stress)
     return parser

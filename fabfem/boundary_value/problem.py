@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 import umat
+from fabfem.boundary_value.conditioning import conditioning_columns
 from fabfem.boundary_value.errors import FIELD, Discretisation, error_columns
 from fabfem.boundary_value.fields import known_fields
 from fabfem.boundary_value.ground import ground_stress, zones_of
@@ -81,10 +82,11 @@ def build(case: BoundaryValueCase) -> Problem:
         found = columns(case, space, stages)
     with _blamed(case, "errors"):
         errors, mesh_error = error_columns(case, model, lambda rule: _with_rule(case, space, rule))
+    diagnosed = conditioning_columns(model) if case.solver.diagnose else ()
     if case.solver.threads:
         umat.set_threads(case.solver.threads)
     omitted = tuple(left_out(case, space, known, substances))
-    return Problem(case, model, (*found, *errors), mesh_error, omitted)
+    return Problem(case, model, (*found, *errors, *diagnosed), mesh_error, omitted)
 
 
 def _space(case: BoundaryValueCase) -> Space:

@@ -35,6 +35,8 @@ class Solver(Table):
     """Linear solver; auto takes PARDISO where it is installed."""
     threads: Annotated[int, Field(ge=0)] = 0
     """Threads for the material points; 0 takes the cores there are."""
+    diagnose: bool = False
+    """Whether condition number and pivot growth of the stiffness are recorded after every increment."""
 
 
 class Probe(Table):

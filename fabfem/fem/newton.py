@@ -13,6 +13,7 @@ import numpy as np
 from scipy.sparse import csr_matrix
 
 from fabfem.fem.assembly import stiffness
+from fabfem.fem.diagnosis import singularity
 from fabfem.fem.linear import norm
 from fabfem.fem.model import Controls, Refusal, elastic_tangents
 from fabfem.fem.trial import Equilibrium, System, Task, Trial, attempt, make_task, mechanical
@@ -159,9 +160,13 @@ def solved(system: System, matrix: csr_matrix, rhs: np.ndarray) -> np.ndarray | 
     if not len(rhs):  # everything is held
         return rhs
     with system.timer.phase("linear_solve"):
-        system.solver.factor(system.reduce(matrix))
+        reduced = system.reduce(matrix)
+        system.solver.factor(reduced)
         solution = system.solver.solve(rhs)
-    return solution.x if solution.ok else Refusal(solution.reason)
+        if solution.ok:
+            return solution.x
+        named = singularity(system, reduced)
+    return Refusal(named or solution.reason)
 
 
 def worst_point(system: System, trial: Trial) -> int:

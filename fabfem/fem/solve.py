@@ -36,7 +36,7 @@ from fabfem.fem.supports import constrain
 from fabfem.fem.trial import PHASES, Equilibrium, System, Trial
 from fabfem.timing import Timer
 
-__all__ = ["Collapsed", "Cutback", "Factor", "Increment", "Start", "Stopped", "march", "reaction"]
+__all__ = ["Collapsed", "Cutback", "Factor", "Increment", "Start", "Stopped", "march", "reaction", "systems_of"]
 
 COURSES = {
     StrengthSearch: "fabfem.fem.safety",
@@ -71,15 +71,21 @@ def march(model: Model, start: Start | None = None) -> Iterator[Increment | Stop
     """
     if start is not None and (why := misfit(model, start)):
         raise ValueError(f"the march cannot be taken up at this start: {why}.")
+    return _all_stages(model, systems_of(model), start)
+
+
+def systems_of(model: Model) -> list[System]:
+    """The equations of every stage; raises ValueError where a stage is impossible."""
     space = model.space
     pattern = find_pattern(space.dofs, space.ndof)
     elastic = stiffness(space, pattern, elastic_tangents(model.zones, model.states, space.npoints))
     shared = (pattern, Timer(PHASES), float(np.abs(elastic.diagonal()).max()))
-    zones, systems = model.zones, []
+    zones: Mapping[str, Zone] = model.zones
+    systems: list[System] = []
     for stage in model.stages:
         zones = changed(zones, stage)
         systems.append(_system(model, stage, zones, *shared))
-    return _all_stages(model, systems, start)
+    return systems
 
 
 def reaction(space: Space, increment: Increment, boundary: str, component: str) -> float:

@@ -68,21 +68,22 @@ def weightless(angle: int, rough: bool, cohesion: float = 0.0, surcharge: float 
     """Return the row of Nc, for a cohesion of one, or of Nq, for a surcharge of one."""
     ground, settlement = WEIGHTLESS[angle]
     name, reference = ("Nc", cohesion_factor(angle)) if cohesion else ("Nq", surcharge_factor(angle))
-    answer = solve(footing(_soil(angle, cohesion=cohesion), settlement, rough, surcharge), ground.mesh("quad"))
+    answer = solve(footing(soil(angle, cohesion=cohesion), settlement, rough, surcharge), ground.mesh("quad"))
     return _row(f"{name} {_KINDS[rough]}, φ = {angle}°", reference, answer, 0.02, above=surcharge)
 
 
 def heavy(angle: int, rough: bool) -> Row:
     """Return the row of Nγ: neither cohesion nor surcharge."""
     ground, settlement = HEAVY[angle]
-    answer = solve(footing(_soil(angle, unit_weight=1.0), settlement, rough), ground.mesh("quad"))
+    answer = solve(footing(soil(angle, unit_weight=1.0), settlement, rough), ground.mesh("quad"))
     return _row(f"Nγ {_KINDS[rough]}, φ = {angle}°", NGAMMA[angle][rough], answer, 0.05, factor=2.0)
 
 
 _KINDS = {False: "smooth", True: "rough"}
 
 
-def _soil(angle: int, cohesion: float = 0.0, unit_weight: float = 0.0) -> dict[str, float | str]:
+def soil(angle: float, cohesion: float = 0.0, unit_weight: float = 0.0) -> dict[str, float | str]:
+    """Return an associated Mohr–Coulomb soil, E = 1000."""
     return {
         "model": "mohr_coulomb",
         "youngs_modulus": 1e3,

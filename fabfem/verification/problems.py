@@ -24,6 +24,11 @@ PROBLEMS = {
     "hill_tube": Problem("Hill's tube: thick Tresca cylinder, b/a = 2", "hill_tube"),
     "mohr_coulomb_hole": Problem("Hole in Mohr-Coulomb ground", "mohr_coulomb_hole"),
     "circular_footing": Problem("Circular footings on Tresca ground", "circular_footing"),
+    "consolidation": Problem("Consolidation: Terzaghi's layer, Mandel's slab, Cryer's sphere", "consolidation"),
+    "undrained_tube": Problem("Thick tube with water that cannot flow", "undrained_tube"),
+    "slopes": Problem("Slopes: factors of safety against upper bounds, associated", "slopes"),
+    "chang_hicher": Problem("Chang-Hicher stress point against an independent prototype", "chang_hicher"),
+    "critical_state": Problem("One critical state, whatever the direction of shear", "critical_state"),
     "bearing_capacity": Problem("Strip footings on associated Mohr-Coulomb ground", "bearing_capacity"),
 }
 """Name -> problem, in the order in which they run."""

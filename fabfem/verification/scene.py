@@ -11,8 +11,9 @@ import numpy as np
 
 from fabfem.boundary_value.problem import Problem, build
 from fabfem.case import BoundaryValueCase, case_from
+from fabfem.fem.increment import Collapsed, Increment, Stopped
 from fabfem.fem.mesh import Mesh
-from fabfem.fem.solve import Increment, Stopped, march
+from fabfem.fem.solve import march
 from umat.mandel import Array
 
 Tables = dict[str, Any]
@@ -31,6 +32,8 @@ class Answer(NamedTuple):
     """Why the run ended early; empty where it reached its end."""
     seconds: float
     """Wall time from the case to the last increment [s]."""
+    collapsed: Collapsed | None = None
+    """How a search for the factor of safety ended."""
 
     def measured(self, measure: "Callable[[Answer], float]") -> float | None:
         """Return what `measure` makes of the answer, or None where the run did not reach its end."""
@@ -69,14 +72,16 @@ def solve(tables: Tables, mesh: Mesh) -> Answer:
         assert isinstance(case, BoundaryValueCase)
         problem = build(case)
     history: list[dict[str, Any]] = []
-    last, stopped = None, ""
+    last, stopped, collapsed = None, "", None
     for step in march(problem.model):
         if isinstance(step, Stopped):
             stopped = f"stage {step.stage} stopped at {100.0 * step.fraction:.3g} %: {step.reason}"
-        elif isinstance(step, Increment):
+        elif isinstance(step, Collapsed):
+            collapsed, stopped = step, "" if step.verdict == "collapse" else step.reason
+        else:
             last = step
             history.append({column.name: column.value(step) for column in problem.columns})
-    return Answer(problem, history, last, stopped, perf_counter() - start)
+    return Answer(problem, history, last, stopped, perf_counter() - start, collapsed)
 
 
 def write_inp(mesh: Mesh, path: Path) -> None:
