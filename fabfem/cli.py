@@ -1,8 +1,8 @@
 """The ``fabfem`` command.
 
-Exit status: 0 done, 1 the pictures could not be drawn, an answer of the verification or of an extreme is wrong, a replay
-ends otherwise or a UMAT breaks its contract, 2 bad input, 3 a run that could not go on (all that converged is kept), 130
-interrupted. Nothing heavy is imported before a command needs it.
+Exit status: 0 done, 1 the pictures could not be drawn, an answer of the verification or of an extreme is wrong, a
+replay ends otherwise or a UMAT breaks its contract, 2 bad input, 3 a run that could not go on (all that converged is
+kept), 130 interrupted. Nothing heavy is imported before a command needs it.
 """
 
 import argparse
