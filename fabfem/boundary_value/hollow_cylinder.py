@@ -71,7 +71,7 @@ def hollow_cylinder_columns(case: BoundaryValueCase, space: Space) -> tuple[Colu
 
 
 def _columns(way: str, found: Callable[[Increment], dict[str, float]], stress: str) -> Iterator[Column]:
-    units = dict.fromkeys(STRESS, stress) | dict.fromkeys(STRAIN, "-") | {"alpha": "degree", "b": "-"}
+    units = dict.fromkeys(STRESS, stress) | dict.fromkeys(STRAIN, "-") | {"alpha": "deg", "b": "-"}
     for name, unit in units.items():
         yield Column(f"{way}_{name}", unit, "average", lambda increment, name=name: found(increment)[name])  # type: ignore[misc]
 
@@ -154,11 +154,14 @@ def _named(stress: tuple[float, ...], strain: tuple[float, ...]) -> dict[str, fl
 
 
 def shape_of(axial: float, radial: float, around: float, shear: float) -> tuple[float, float]:
-    """Return the direction α of the major stress from the axis [degree] and b; NaN where the stress is isotropic."""
+    """Return the direction α of the major stress from the axis and b; NaN where the stress is isotropic.
+
+    α goes from -45° to 135°, so that it does not jump where compression along the axis or around it is largest.
+    """
     if np.hypot(axial - around, 2.0 * shear) <= 1e-9 * abs(axial + radial + around):
         alpha = np.nan
     else:
-        alpha = 0.5 * np.degrees(np.arctan2(2.0 * shear, axial - around))
+        alpha = (0.5 * np.degrees(np.arctan2(2.0 * shear, axial - around)) + 45.0) % 180.0 - 45.0
     major, middle, minor = principal(from_tensor([[radial, 0, 0], [0, axial, shear], [0, shear, around]]))
     spread = major - minor
     return float(alpha), float((middle - minor) / spread) if spread > 1e-9 * abs(major) else np.nan

@@ -28,6 +28,15 @@ class Parameter(Table):
     """Values that it takes."""
     set: dict[str, Value] = Field(default={})
     """Values by place that go with all of them."""
+    along: dict[str, Values] = Field(default={})
+    """Values by place, one for each of `values`, that go with it."""
+
+    @model_validator(mode="after")
+    def _as_many(self) -> "Parameter":
+        for place, values in self.along.items():
+            if len(values) != len(self.values):
+                raise ValueError(f"has {len(self.values)} values, but {len(values)} along with them for {place}")
+        return self
 
 
 class Runs(Table):

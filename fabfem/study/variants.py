@@ -72,8 +72,11 @@ def one_at_a_time(parameters: Sequence[Parameter]) -> list[Choice]:
 
 def settings_of(parameter: Parameter) -> list[Setting]:
     """Return the settings that a parameter takes."""
-    also = tuple(parameter.set.items())
-    return [Setting(parameter.name, parameter.at, value, also) for value in parameter.values]
+    set_for_all, along = tuple(parameter.set.items()), parameter.along.items()
+    return [
+        Setting(parameter.name, parameter.at, value, (*set_for_all, *((place, each[number]) for place, each in along)))
+        for number, value in enumerate(parameter.values)
+    ]
 
 
 class _Entry(NamedTuple):
