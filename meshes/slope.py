@@ -2,8 +2,8 @@
 
 Every slope falls to the right, its toe at the origin. The boundaries are left, right, bottom, crest, face, toe (the
 level ground before it, where there is some); the zone above the toe is "slope", below it "ground". Needs gmsh
-(``pip install gmsh``): ``python meshes/slope.py [FOLDER [FORMAT]]`` writes one file for each slope of `SLOPES`, in gmsh's
-format 4.1 (``msh``) or as Abaqus input (``inp``).
+(``pip install gmsh``): ``python meshes/slope.py [FOLDER [FORMAT]]`` writes one file for each slope of `SLOPES`, in
+gmsh's format 4.1 (``msh``) or as Abaqus input (``inp``).
 """
 
 import sys
