@@ -10,7 +10,9 @@ from collections.abc import Callable
 from pathlib import Path
 
 import matplotlib.pyplot as plt
+import meshio
 import numpy as np
+from matplotlib.collections import PolyCollection
 
 HOME = Path(__file__).parents[2]
 Rows = list[dict[str, str]]
@@ -136,6 +138,28 @@ def biaxial(name: str) -> None:
             f"{np.interp(0.06, strain, q):.1f} | {q[-1]:.1f} | {100 * strain[-1]:.1f} % | "
             f"{100 * np.median(share[last]):.0f} % | {mine[-1]['status']} | {cost(name, mine[-1])} |"
         )
+    bands(name)
+
+
+def bands(name: str) -> None:
+    """Draw the axial strain at the end, a row of meshes for each viscosity."""
+    runs = {(row["viscosity"], row["cells"]): row["folder"] for row in rows(name)}
+    ranks = [list(dict.fromkeys(key[place] for key in runs)) for place in (0, 1)]
+    figure, grid = plt.subplots(len(ranks[0]), len(ranks[1]), figsize=(5.5, 6.5), squeeze=False)
+    for (viscosity, cells), folder in runs.items():
+        axes = grid[ranks[0].index(viscosity), ranks[1].index(cells)]
+        file = max((HOME / "results" / f"{name}_sweep" / folder).glob("fields_*.vtu"))
+        mesh = meshio.read(file)
+        (block,) = mesh.cells
+        axial = 100 * mesh.cell_data["strain"][0][:, 1]
+        drawn = PolyCollection(list(mesh.points[block.data[:, :4], :2]), array=axial, cmap="viridis")
+        drawn.set_clim(0.0, 20.0)
+        axes.add_collection(drawn)
+        axes.set(aspect="equal", title=f"η = {viscosity}, {cells}", xlim=(-0.02, 0.02), ylim=(0.0, 0.08))
+        axes.set_axis_off()
+        axes.title.set_fontsize(8)
+    figure.colorbar(drawn, ax=grid, label="axial strain [%]", shrink=0.6)
+    figure.savefig(HOME / "docs" / f"scenes_{name}.png", dpi=100, bbox_inches="tight")
 
 
 def save(figure: plt.Figure, name: str) -> None:
