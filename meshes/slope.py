@@ -2,7 +2,8 @@
 
 Every slope falls to the right, its toe at the origin. The boundaries are left, right, bottom, crest, face, toe (the
 level ground before it, where there is some); the zone above the toe is "slope", below it "ground". Needs gmsh
-(``pip install gmsh``): ``python meshes/slope.py [FOLDER]`` writes one file for each slope of `SLOPES`.
+(``pip install gmsh``): ``python meshes/slope.py [FOLDER [FORMAT]]`` writes one file for each slope of `SLOPES`, in
+gmsh's format 4.1 (``msh``) or as Abaqus input (``inp``).
 """
 
 import sys
@@ -91,8 +92,8 @@ def grade(slope: Slope, face: int) -> None:
         gmsh.option.setNumber(f"Mesh.{option}", 0)
 
 
-def main(folder: Path) -> None:
-    """Write the meshes into `folder`."""
+def main(folder: Path, suffix: str = "msh") -> None:
+    """Write the meshes into `folder`, in the format that `suffix` names."""
     for name, slope in SLOPES.items():
         gmsh.initialize()
         gmsh.option.setNumber("General.Terminal", 0)
@@ -102,9 +103,9 @@ def main(folder: Path) -> None:
         gmsh.option.setNumber("Mesh.SecondOrderIncomplete", 1)
         gmsh.model.mesh.generate(2)
         gmsh.model.mesh.setOrder(2)
-        gmsh.write(str(folder / f"{name}.msh"))
+        gmsh.write(str(folder / f"{name}.{suffix}"))
         gmsh.finalize()
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).parent)
+    main(Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).parent, *sys.argv[2:3])

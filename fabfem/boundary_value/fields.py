@@ -55,6 +55,15 @@ def known_fields(zones: Mapping[str, Zone], wet: bool = False) -> tuple[str, ...
     return (*AT_NODES, *OF_MOTION, *OF_STRESS, *own, *((PORE_PRESSURE,) if wet else ()))
 
 
+def point_tensors(zones: Mapping[str, Zone]) -> dict[str, bool]:
+    """Return whether each field of the points is a tensor, for those fields that a single number or tensor makes."""
+    found = {name: name in ("stress", "strain", "strain_increment") for name in (*OF_STRESS, *OF_MOTION)}
+    for zone in zones.values():
+        own = umat.state_fields(zone.material, _first(zone.state))
+        found |= {name: values.shape[1:] == (6,) for name, values in own.items() if values.shape[1:] in ((), (6,))}
+    return found
+
+
 def point_fields(space: Space, increment: Increment, asked: Sequence[str]) -> dict[str, Array]:
     """Return the asked fields at the points of the whole mesh, tensors as Mandel vectors; NaN where there is no zone.
 

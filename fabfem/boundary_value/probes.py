@@ -7,12 +7,14 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from fabfem.boundary_value.fields import QUANTITIES, point_fields
 from fabfem.boundary_value.water import nodal_pore_pressure
 from fabfem.case import BoundaryValueCase
 from fabfem.case.boundary_value import Derived, Probe, Reaction
 from fabfem.fem.increment import Increment
 from fabfem.fem.space import Space
 from fabfem.fem.stages import ArcLength, DisplacementControl, Stage, StrengthSearch
+from umat.mandel import Array, to_tensor
 
 Value = str | int | float
 Measure = Callable[[Increment], float]
@@ -57,7 +59,8 @@ def columns(case: BoundaryValueCase, space: Space, stages: Sequence[Stage] = ())
     for probe in case.probe:
         measure, quantity = PROBES[probe.kind]
         measures[probe.name] = measure(case, probe, space)
-        found.append(Column(probe.name, units.label(quantity), "probe", measures[probe.name]))
+        quantity = QUANTITIES.get(probe.field) if probe.field else quantity
+        found.append(Column(probe.name, units.label(quantity) if quantity else "-", "probe", measures[probe.name]))
     for entry in case.reaction:
         measures[entry.name] = _force(entry, space)
         found.append(Column(entry.name, force, "reaction", measures[entry.name]))
@@ -95,8 +98,53 @@ def _pore_pressure(case: BoundaryValueCase, probe: Probe, space: Space) -> Measu
     return lambda increment: float(probe.scale * nodal_pore_pressure(case, space, increment)[nodes].mean())
 
 
-PROBES = {"displacement": (_displacement, "length"), "pore_pressure": (_pore_pressure, "stress")}
-"""How each kind of probe measures, and what."""
+def _mean(_: BoundaryValueCase, probe: Probe, space: Space) -> Measure:
+    """Return the scaled volume mean of a field."""
+
+    def measure(increment: Increment) -> float:
+        values, weights = _sample(probe, space, increment)
+        return float(probe.scale * np.average(values, weights=weights))
+
+    return measure
+
+
+def _deviation(_: BoundaryValueCase, probe: Probe, space: Space) -> Measure:
+    """Return the scaled standard deviation of a field about its volume mean."""
+
+    def measure(increment: Increment) -> float:
+        values, weights = _sample(probe, space, increment)
+        apart = values - np.average(values, weights=weights)
+        return float(probe.scale * np.sqrt(np.average(apart**2, weights=weights)))
+
+    return measure
+
+
+def _sample(probe: Probe, space: Space, increment: Increment) -> tuple[Array, Array]:
+    """Return a field, or an entry of it, and the volumes of its points, where its zones are.
+
+    ValueError if a tensor has no entry named, or a number has one.
+    """
+    name = probe.field or ""
+    values = point_fields(space, increment, (name,))[name]
+    if probe.entry:
+        row, column = ("xyz".index(axis) for axis in probe.entry)
+        values = to_tensor(values)[:, row, column]
+    there = ~np.isnan(values)
+    if probe.zones:
+        inside = np.zeros(space.npoints, bool)
+        for zone in probe.zones:
+            inside[space.points_of(space.mesh.zone(zone))] = True
+        there &= inside
+    return values[there], space.weights[there]
+
+
+PROBES: dict[str, tuple[Callable[[BoundaryValueCase, Probe, Space], Measure], str | None]] = {
+    "displacement": (_displacement, "length"),
+    "pore_pressure": (_pore_pressure, "stress"),
+    "mean": (_mean, None),
+    "deviation": (_deviation, None),
+}
+"""How each kind of probe measures, and what, where it is not the field that decides."""
 
 
 def _probed(probe: Probe, space: Space) -> NDArray[np.intp]:

@@ -13,8 +13,9 @@ import numpy as np
 import umat
 from fabfem.boundary_value.conditioning import conditioning_columns
 from fabfem.boundary_value.errors import FIELD, Discretisation, error_columns
-from fabfem.boundary_value.fields import known_fields
+from fabfem.boundary_value.fields import known_fields, point_tensors
 from fabfem.boundary_value.ground import ground_stress, zones_of
+from fabfem.boundary_value.hollow_cylinder import hollow_cylinder_columns
 from fabfem.boundary_value.meshes import mesh_of, mesh_place
 from fabfem.boundary_value.omitted import left_out
 from fabfem.boundary_value.probes import Column, columns
@@ -74,12 +75,15 @@ def build(case: BoundaryValueCase) -> Problem:
     with _blamed(case, "material"):
         known = known_fields(zones | dict(_spare(substances, zones)), case.water is not None)
     _check_fields(case, known)
+    _check_probes(case, zones)
     with _blamed(case, "material"):
         filling = {zone: name for name in case.material for zone in zones_of(case, name, space.mesh)}
         water = pore_water(case, space, zones, filling)
         model = Model(space, zones, stages, _controls(case), case.solver.linear, water)
     with _blamed(case, "probe or reaction"):
         found = columns(case, space, stages)
+    with _blamed(case, "hollow_cylinder"):
+        found = (*found, *hollow_cylinder_columns(case, space))
     with _blamed(case, "errors"):
         errors, mesh_error = error_columns(case, model, lambda rule: _with_rule(case, space, rule))
     diagnosed = conditioning_columns(model) if case.solver.diagnose else ()
@@ -195,6 +199,21 @@ def _check_fields(case: BoundaryValueCase, known: Sequence[str]) -> None:
             raise CaseError(
                 f"{case.path.name}: output.fields: no material here has a field '{name}'{suggest(name, known)}"
             )
+
+
+def _check_probes(case: BoundaryValueCase, zones: Mapping[str, Zone]) -> None:
+    """Refuse probes of fields that no point has, or that do not say which entry of a tensor they mean."""
+    tensors = point_tensors(zones)
+    for probe in case.probe:
+        if probe.field is None:
+            continue
+        where = f"{case.path.name}: probe[{probe.name}]"
+        if probe.field not in tensors:
+            hint = suggest(probe.field, tensors)
+            raise CaseError(f"{where}.field: no material here has a field '{probe.field}' at its points{hint}")
+        if tensors[probe.field] != (probe.entry is not None):
+            what = "a tensor and needs an entry, such as xx" if tensors[probe.field] else "a number and has no entry"
+            raise CaseError(f"{where}.entry: '{probe.field}' is {what}")
 
 
 @contextmanager

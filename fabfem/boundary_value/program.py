@@ -170,13 +170,19 @@ def _acting(scene: Scene, key: tuple[str, ...], course: Course, bodies: Sequence
 
 
 def _body(space: Space, said: stages.Rigid) -> RigidBody:
-    """Return the rigid body on a boundary; raises ValueError for a smooth one on a boundary that is not straight."""
+    """Return the rigid body on a boundary; ValueError for a bent one that is not rough, or ribs without torsion."""
     points = space.mesh.points[np.unique(space.mesh.boundary(said.boundary))]
     low, high = points.min(axis=0), points.max(axis=0)
     across = int(np.argmin(high - low))
-    if said.contact == "smooth" and high[across] - low[across] > 1e-9 * (high - low).max():
-        raise ValueError(f"a smooth rigid body needs a boundary along an axis, which '{said.boundary}' is not")
-    ties = (space.components[across],) if said.contact == "smooth" else space.components
+    if said.contact != "rough" and high[across] - low[across] > 1e-9 * (high - low).max():
+        raise ValueError(f"a {said.contact} rigid body needs a boundary along an axis, which '{said.boundary}' is not")
+    if said.contact == "ribbed" and "theta" not in space.components:
+        raise ValueError("a ribbed rigid body needs the kinematics axisymmetric_torsion")
+    ties = {
+        "rough": space.components,
+        "smooth": (space.components[across],),
+        "ribbed": (space.components[across], "theta"),
+    }[said.contact]
     point = tuple(0.5 * (low + high)) if said.point is None else said.point
     return RigidBody(said.boundary, ties, point, {str(name): value for name, value in said.motion.items()})
 

@@ -44,14 +44,20 @@ class Probe(Table):
 
     name: Identifier
     """Name of the column."""
-    kind: Literal["displacement", "pore_pressure"] = "displacement"
-    """What is probed."""
+    kind: Literal["displacement", "pore_pressure", "mean", "deviation"] = "displacement"
+    """What is probed: at nodes, or the volume mean or standard deviation of a field."""
     boundary: Names | None = None
     """Boundaries over whose nodes the mean is taken."""
     point: Annotated[tuple[float, ...], Field(min_length=2, max_length=3, strict=False)] | None = None
     """Point whose nearest node is taken, instead of a boundary."""
     component: Component | None = None
     """Component of the displacement; a pore pressure has none."""
+    field: Identifier | None = None
+    """Field of the points whose mean or deviation is taken."""
+    entry: Literal["xx", "yy", "zz", "yz", "xz", "xy"] | None = None
+    """Entry of a field that is a tensor, along the axes of the mesh (about an axis: x = r, y = z, z = theta)."""
+    zones: Names | None = None
+    """Zones over which they are taken; all when left out."""
     scale: float = 1.0
     """Factor on the value."""
 
@@ -80,6 +86,17 @@ class Derived(Table):
     """Number, or numbers, to divide by."""
     unit: Text = "-"
     """Unit of the result."""
+
+
+class HollowCylinder(Table):
+    """A hollow cylinder whose averages are written to the history, as a laboratory has them and as volume means."""
+
+    inner: Text
+    """Boundary at the inner radius."""
+    outer: Text
+    """Boundary at the outer radius."""
+    platen: Text
+    """Boundary that carries the axial force and the torque; the opposite end does not move along or around the axis."""
 
 
 class Output(Table):
@@ -128,6 +145,8 @@ class BoundaryValueCase(Case):
     """Forces to record."""
     derived: Annotated[tuple[Derived, ...], Field(strict=False)] = ()
     """Columns made from others."""
+    hollow_cylinder: HollowCylinder | None = None
+    """Averages of a hollow cylinder to record; none when left out."""
     output: Output | None = None
     """Fields to store; none when left out."""
     errors: Errors | None = None

@@ -3,7 +3,7 @@
 from collections import Counter
 from collections.abc import Iterator
 
-from fabfem.case.boundary_value import BoundaryValueCase
+from fabfem.case.boundary_value import BoundaryValueCase, Probe
 from fabfem.case.materials import ChangHicher, Umat
 from fabfem.case.stages import COMPONENTS, DisplacementControl, Geostatic, Gravity, Load, StrengthReduction, Vector
 from fabfem.case.table import suggest
@@ -29,12 +29,27 @@ def _odd_columns(case: BoundaryValueCase) -> Iterator[tuple[str, str]]:
         if 0.0 in derived.divide_by:
             yield f"{where}.divide_by", "must not be zero"
     for probe in case.probe:
-        if (probe.boundary is None) == (probe.point is None):
-            yield f"probe[{probe.name}]", "needs either a boundary or a point"
-        if (probe.component is None) != (probe.kind == "pore_pressure"):
-            yield f"probe[{probe.name}].component", "goes with a displacement, and only with that"
-        if probe.kind == "pore_pressure" and case.water is None:
-            yield f"probe[{probe.name}].kind", "asks for a pore pressure, but the case has no [water]"
+        yield from ((f"probe[{probe.name}]{key}", what) for key, what in _odd_probe(case, probe))
+    if case.hollow_cylinder and case.scene.kinematics != "axisymmetric_torsion":
+        yield "hollow_cylinder", "needs the kinematics axisymmetric_torsion"
+
+
+def _odd_probe(case: BoundaryValueCase, probe: Probe) -> Iterator[tuple[str, str]]:
+    """Yield (key, what) for what a probe says too much or too little."""
+    of_points = probe.kind in ("mean", "deviation")
+    places = [probe.boundary, probe.point].count(None)
+    if of_points and places != 2:
+        yield "", "is taken over zones, so it has neither a boundary nor a point"
+    if not of_points and places != 1:
+        yield "", "needs either a boundary or a point"
+    if (probe.component is None) != (probe.kind != "displacement"):
+        yield ".component", "goes with a displacement, and only with that"
+    if (probe.field is None) == of_points:
+        yield ".field", "goes with a mean or a deviation, and only with those"
+    if not of_points and (probe.entry or probe.zones):
+        yield ".kind", "has neither an entry nor zones; only a mean or a deviation has them"
+    if probe.kind == "pore_pressure" and case.water is None:
+        yield ".kind", "asks for a pore pressure, but the case has no [water]"
 
 
 def _odd_water(case: BoundaryValueCase) -> Iterator[tuple[str, str]]:

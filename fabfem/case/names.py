@@ -27,6 +27,10 @@ def boundaries_of(case: BoundaryValueCase) -> Iterator[tuple[str, tuple[str, ...
                 yield from ((f"{place}[{n}].boundary", term.boundary) for n, term in enumerate(stage.control.terms, 1))
     yield from ((f"probe[{probe.name}].boundary", probe.boundary or ()) for probe in case.probe)
     yield from ((f"reaction[{entry.name}].boundary", entry.boundary) for entry in case.reaction)
+    if case.hollow_cylinder:
+        said = case.hollow_cylinder
+        for key, names in (("inner", said.inner), ("outer", said.outer), ("platen", said.platen)):
+            yield f"hollow_cylinder.{key}", (names,)
 
 
 def zones_named(case: BoundaryValueCase) -> Iterator[tuple[str, tuple[str, ...]]]:
@@ -42,3 +46,4 @@ def zones_named(case: BoundaryValueCase) -> Iterator[tuple[str, tuple[str, ...]]
             )
         if isinstance(stage, StrengthReduction):
             yield f"{place}.excluded_zones", stage.excluded_zones or ()
+    yield from ((f"probe[{probe.name}].zones", probe.zones or ()) for probe in case.probe)

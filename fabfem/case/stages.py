@@ -101,8 +101,9 @@ class Rigid(Table):
 
     boundary: Text
     """Boundary of the mesh that it lies on."""
-    contact: Literal["rough", "smooth"] = "rough"
-    """Whether the nodes follow it in all components, or only across the boundary, which is then straight."""
+    contact: Literal["rough", "smooth", "ribbed"] = "rough"
+    """Whether the nodes follow it in all components, only across the boundary, which is then straight, or across it and
+    around the axis, as on a platen whose radial ribs grip a hollow cylinder and let it widen."""
     point: Annotated[tuple[float, ...], Field(min_length=2, max_length=3, strict=False)] | None = None
     """Point that its motions and forces refer to; the middle of the boundary when left out."""
     motion: dict[Motion, float] = Field(default={})

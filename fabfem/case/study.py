@@ -32,6 +32,15 @@ class Parameter(Table):
     """Whether each value is a list, with an entry for each place."""
     labels: Names | None = None
     """Names of the values in tables and pictures; the values themselves when left out."""
+    along: dict[str, Values] = Field(default={})
+    """Values by place, one for each of `values`, that go with it."""
+
+    @model_validator(mode="after")
+    def _as_many(self) -> "Parameter":
+        for place, values in self.along.items():
+            if len(values) != len(self.values):
+                raise ValueError(f"has {len(self.values)} values, but {len(values)} along with them for {place}")
+        return self
 
     @model_validator(mode="after")
     def _listed(self) -> "Parameter":

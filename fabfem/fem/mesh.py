@@ -149,10 +149,19 @@ def _read(path: Path) -> meshio.Mesh:
     said = StringIO()
     try:
         with redirect_stdout(said), redirect_stderr(said):
-            return meshio.read(path)
+            return _middle_last(meshio.read(path), path)
     except (meshio.ReadError, LookupError, SystemExit, TypeError, ValueError) as error:
         reason = said.getvalue().partition("\n")[0] or str(error) or "unknown format"
         raise MeshError(f"{path.name} cannot be read as a mesh: {reason.rstrip('.')}.") from error
+
+
+def _middle_last(raw: meshio.Mesh, path: Path) -> meshio.Mesh:
+    """The mesh with the middle node of a line last: Abaqus numbers it along the line, and meshio leaves it there."""
+    if path.suffix.lower() == ".inp":
+        for block in raw.cells:
+            if block.type == "line3":
+                block.data = block.data[:, [0, 2, 1]]
+    return raw
 
 
 _ABAQUS = {

@@ -77,13 +77,18 @@ def settings_of(parameter: Parameter) -> list[Setting]:
 
 def _setting(parameter: Parameter, number: int) -> Setting:
     """Return a setting; one that is known by a label, or has a value for each place, has its values in `also`."""
-    value, also = parameter.values[number], tuple(parameter.set.items())
+    value, also = parameter.values[number], _also(parameter, number)
     label = parameter.labels[number] if parameter.labels else None
     if not parameter.each and label is None:
         return Setting(parameter.name, parameter.at, value, also)
     entries = value if parameter.each and isinstance(value, tuple) else [value] * len(parameter.at)
     shown = value if label is None else label
     return Setting(parameter.name, (), shown, (*also, *zip(parameter.at, entries, strict=True)))
+
+
+def _also(parameter: Parameter, number: int) -> tuple[tuple[str, Any], ...]:
+    """Return what goes with a value, by place."""
+    return (*parameter.set.items(), *((place, values[number]) for place, values in parameter.along.items()))
 
 
 class _Entry(NamedTuple):

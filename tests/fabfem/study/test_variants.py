@@ -71,3 +71,11 @@ def test_a_product_has_every_combination_once(values: list[list[int]]) -> None:
         expected *= len(some)
     assert len(set(found)) == len(found) == expected
     assert len(one_at_a_time(parameters)) == 1 + sum(map(len, values))
+
+
+def test_values_go_along_with_their_own() -> None:
+    turned = Parameter(name="angle", at="a.x", values=(1.0, 2.0), along={"a.y": (10.0, 20.0), "b": ("p", "q")})
+    made = [variant({"a": {"x": 0.0}}, choice) for choice in choices([turned])]
+    assert made == [{"a": {"x": 1.0, "y": 10.0}, "b": "p"}, {"a": {"x": 2.0, "y": 20.0}, "b": "q"}]
+    with pytest.raises(ValueError, match=r"has 2 values, but 1 along with them for a\.y"):
+        Parameter(name="angle", at="a.x", values=(1.0, 2.0), along={"a.y": (10.0,)})
