@@ -122,3 +122,10 @@ def test_a_ring_without_torque_is_the_element_test(tmp_path: Path) -> None:
     for way in ("hgs", "mean"):
         assert float(ring[f"{way}_sigma_z"][-1]) == pytest.approx(float(point["stress_zz"][-1]), rel=3e-3)
     assert float(ring["deviation_q"][-1]) < 0.01 * float(ring["mean_q"][-1])
+
+
+def test_inclined_bedding_pushes_a_guided_footing_sideways(tmp_path: Path) -> None:
+    pytest.importorskip("gmsh")
+    history = small("footing/strip_toyoura_bedding.toml", sunk("y", {"mesh.parameters.size": 4.0}), tmp_path / "out")
+    assert float(history["q/(gamma B)"][-1]) == pytest.approx(0.58349, rel=1e-3)
+    assert float(history["horizontal_force"][-1]) < -0.01 * float(history["footing_force"][-1])
