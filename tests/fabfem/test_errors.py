@@ -103,9 +103,7 @@ def test_the_recovered_stress_tells_the_error_of_the_mesh(shape: str, order: int
     for size in (0.5, 0.25, 0.125):
         problem, step = lame(shape, order, points, size)
         errors.append(true_error(problem, step))
-        assert (
-            0.85 < problem.mesh_error.value(step) / errors[-1] < 1.3
-        )  # linear triangles with a mean volume strain: 1.25
+        assert 0.85 < problem.mesh_error.value(step) / errors[-1] < 1.3  # 1.25: triangles, mean dilation
         assert 0.5 < np.sqrt(np.mean(problem.mesh_error.field(step) ** 2)) / errors[-1] < 2.0
     assert np.log2(errors[1] / errors[2]) == pytest.approx(order, abs=0.2)
 
@@ -173,7 +171,7 @@ def test_the_error_of_directions_vanishes_with_the_same_rule_and_sees_a_poor_one
 ) -> None:
     sand["errors"] = {"estimate": ["directions"], "rule": "bazant_oh_37"}
     sand["output"]["fields"] = ["stress"]
-    assert history(sand, tmp_path)["error_directions"] < 1e-14
+    assert history(sand, tmp_path)["error_directions"] < 1e-11
     poor = variant(sand, [Setting("", ("errors.rule",), "lebedev_23"), Setting("", (RULE,), "bazant_oh_21")])
     good = variant(sand, [Setting("", ("errors.rule",), "lebedev_23"), Setting("", (RULE,), "lebedev_17")])
     assert history(good, tmp_path)["error_directions"] < 0.5 * history(poor, tmp_path)["error_directions"]
