@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
-from pydantic import ValidationError
+from pydantic import BaseModel, ValidationError
 
 from fabfem.case.boundary_value import BoundaryValueCase
 from fabfem.case.contradictions import contradictions
@@ -71,7 +71,23 @@ def _kind(tables: dict[str, Any], path: Path) -> str:
 
 def resolved(case: Case) -> str:
     """Return the case with all its defaults as TOML text."""
-    return write_toml(case.model_dump())
+    return write_toml(_said(case))
+
+
+def _said(table: BaseModel) -> dict[str, Any]:
+    """Return the values of a table by key, without what is empty by default."""
+    empty = {key for key, field in type(table).model_fields.items() if field.default in ((), {})}
+    values = ((key, getattr(table, key)) for key in type(table).model_fields)
+    return {key: _plain(value) for key, value in values if value or key not in empty}
+
+
+def _plain(value: Any) -> Any:
+    """Return a value with tables as dictionaries."""
+    if isinstance(value, BaseModel):
+        return _said(value)
+    if isinstance(value, dict):
+        return {key: _plain(entry) for key, entry in value.items()}
+    return [_plain(entry) for entry in value] if isinstance(value, list | tuple) else value
 
 
 def read_tables(path: Path) -> dict[str, Any]:

@@ -1,6 +1,7 @@
-"""TOML text of a resolved case.
+"""TOML text of the tables of a case.
 
-What is absent is left out, and so are empty lists and tables: in a case they say the same.
+What is absent (``None``) is left out. An empty list is written: ``zones = []`` is a material for later, and no ``zones``
+is a material everywhere.
 """
 
 import json
@@ -12,13 +13,13 @@ BARE = re.compile(r"[A-Za-z0-9_\-]+\Z")
 
 
 def write_toml(tables: Mapping[str, Any]) -> str:
-    """Return TOML text that reads back as the given tables, less what is ``None`` or empty."""
+    """Return TOML text that reads back as the given tables, less what is ``None``."""
     return "\n\n".join(_blocks(tables, (), "")) + "\n"
 
 
 def _blocks(table: Mapping[str, Any], path: tuple[str, ...], header: str) -> Iterator[str]:
     """Yield one block of text for the table's own values and one for each table below it."""
-    present = {key: value for key, value in table.items() if value is not None and value not in ((), [], {})}
+    present = {key: value for key, value in table.items() if value is not None}
     own = [f"{_key(key)} = {_value(value)}" for key, value in present.items() if not _is_table(value)]
     if own or header.startswith("[[") or (header and not present):
         yield "\n".join([*filter(None, [header]), *own])

@@ -79,6 +79,17 @@ def test_bad_input_gets_a_sentence_naming_the_place(name: str, tmp_path: Path) -
     assert "\n" not in sentence
 
 
+def test_an_empty_list_is_printed_where_it_says_something() -> None:
+    """A material with no zone is not one that has them all."""
+    later = '[material.later]\nmodel = "elastic"\nyoungs_modulus = 1.0\nzones = []\n\n[solver]'
+    text = FOOTING.replace("[solver]", later).replace('preset = "toyoura"', 'preset = "toyoura"\nzones = ["all"]')
+    case = case_from(tomllib.loads(text))
+    printed = resolved(case)
+    assert "zones = []" in printed
+    assert "traction" not in printed
+    assert case_from(tomllib.loads(printed)) == case
+
+
 def test_missing_file_names_its_neighbour(tmp_path: Path) -> None:
     (tmp_path / "footing.toml").touch()
     with pytest.raises(CaseError, match=r"there is no such file; did you mean 'footing\.toml'\?"):
@@ -121,7 +132,7 @@ def test_toml_reads_back(tables: dict) -> None:
 
 def _without_absent(value: object) -> object:
     if isinstance(value, dict):
-        return {key: _without_absent(entry) for key, entry in value.items() if entry not in (None, [], {}, ())}
+        return {key: _without_absent(entry) for key, entry in value.items() if entry is not None}
     return [_without_absent(entry) for entry in value] if isinstance(value, list) else value
 
 

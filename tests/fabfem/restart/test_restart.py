@@ -19,8 +19,7 @@ from fabfem.run import run_case
 
 def written(folder: Path, tables: dict[str, Any], name: str = "case.toml") -> Path:
     path = folder / name
-    text = write_toml(tables).replace("[material.stiff]", "[material.stiff]\nzones = []")  # which write_toml leaves out
-    path.write_text(text, encoding="utf-8")
+    path.write_text(write_toml(tables), encoding="utf-8")
     return path
 
 
