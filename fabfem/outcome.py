@@ -1,17 +1,30 @@
 """How a run of any scene ended, and what a scene says about itself before it runs."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from filelock import FileLock, Timeout
+
 from fabfem.case import CaseError
+from fabfem.output.history import read_history
 from fabfem.output.progress import summary
+
+LOCK = ".lock"
+"""File in the folder of a result that is locked while a run writes there."""
+UNWRITTEN = "unwritten"
+"""Status of a run whose results could not be written to their end."""
+
+INTERRUPTED = "interrupted; all increments that converged are kept"
+"""Reason of a run that was interrupted."""
 
 
 class Outcome(NamedTuple):
     """How a run ended."""
 
     status: str
-    """``completed``, ``stopped`` or ``interrupted``."""
+    """``completed``, ``stopped``, ``interrupted``, or ``unwritten`` where the results could not be written."""
     reason: str
     """Why it ended before its end, in a sentence; empty when completed."""
     folder: Path
@@ -42,13 +55,53 @@ class Description(NamedTuple):
     """Memory that a run needs [MiB]; 0 where the scene cannot tell."""
 
 
-def make_folder(folder: Path) -> None:
-    """Make the folder of the results; `CaseError` if nothing can be written there."""
+class FolderError(CaseError):
+    """A folder that takes no results now, whatever the case says."""
+
+
+@contextmanager
+def claimed(folder: Path) -> Iterator[None]:
+    """Make the folder of some results and keep other runs out of it while inside.
+
+    The lock is the operating system's: it goes with the process that holds it, however that ends. A file system that
+    knows no locks keeps nobody out.
+
+    Raises
+    ------
+    FolderError
+        If nothing can be written there, or another run is writing there.
+    """
+    lock = FileLock(folder / LOCK)
     try:
         folder.mkdir(parents=True, exist_ok=True)
+        with suppress(NotImplementedError):
+            lock.acquire(timeout=0)
         (folder / "report.json").touch()
+    except Timeout:
+        raise FolderError(
+            f"{folder}: another run is writing its results there; wait for its end, or name another folder by --out"
+        ) from None
     except OSError as error:
-        raise CaseError(f"{folder}: results cannot be written there ({error.strerror or error})") from None
+        lock.release()
+        raise FolderError(f"{folder}: results cannot be written there ({error.strerror or error})") from None
+    try:
+        yield
+    finally:
+        lock.release()
+
+
+def unwritten(error: OSError, folder: Path, seconds: float) -> Outcome:
+    """Return how a run ended whose results could not be written any more; what was begun and not done is removed."""
+    for file in folder.glob(".*.part"):
+        file.unlink(missing_ok=True)
+    where = f"{Path(error.filename).name.removeprefix('.').removesuffix('.part')}: " if error.filename else ""
+    reason = (
+        f"the results in {folder} cannot be written: {where}{error.strerror or error}; what was written is kept, "
+        "and --resume goes on from the last checkpoint once the cause is mended"
+    )
+    with suppress(OSError, ValueError):
+        return Outcome(UNWRITTEN, reason, folder, len(read_history(folder / "history.csv")[1]), (), seconds)
+    return Outcome(UNWRITTEN, reason, folder, 0, (), seconds)
 
 
 def short(value: Any) -> str:

@@ -21,9 +21,9 @@ from fabfem.fem.mesh import Mesh
 from fabfem.fem.solve import march
 from fabfem.fem.start import misfit
 from fabfem.identity import hashed, identity
-from fabfem.outcome import Description, Outcome, make_folder, short
+from fabfem.outcome import INTERRUPTED, Description, Outcome, claimed, short, unwritten
 from fabfem.output.checkpoints import Checkpoint
-from fabfem.output.interrupt import held_back
+from fabfem.output.interrupt import held_back, patient
 from fabfem.output.progress import Quiet, Terminal
 from fabfem.restart import FRESH, Restart, checkpoint_of
 from fabfem.timing import Timer
@@ -69,11 +69,13 @@ def run(
         known = identity(case, mesh=_hashed(problem.model.space.mesh))
         begun = checkpoint_of(restart, folder, known)
         steps = _steps(problem, begun, restart)
-    make_folder(folder)
-    recorder = _recorder(problem, folder, timer, known, begun, restart)
-    stages = len(problem.model.stages)
-    with Quiet() if quiet else Terminal(stages) as shown:
-        status, reason = _drive(steps, recorder, shown)
+    with claimed(folder):
+        try:
+            recorder = _recorder(problem, folder, timer, known, begun, restart)
+            with Quiet() if quiet else Terminal(len(problem.model.stages)) as shown:
+                status, reason = _drive(steps, recorder, shown)
+        except OSError as error:
+            return unwritten(error, folder, timer.total())
     headers = [column.header for column in problem.columns]
     last = tuple((header, short(value)) for header, value in zip(headers, recorder.row, strict=False))
     return Outcome(status, reason, folder, len(recorder.report.content["increments"]), last, timer.total())
@@ -131,21 +133,22 @@ def _drive(steps: Iterator[Increment | Stopped | Collapsed], recorder: Recorder,
     """March to the end and return the status and the reason."""
     case = recorder.problem.case
     try:
-        for step in steps:
-            if isinstance(step, Stopped):
-                recorder.stopped(step)
-                return recorder.end("stopped", _why(step, recorder.problem), step.cutbacks)
-            if isinstance(step, Collapsed):
-                return _found(step, recorder, shown)
-            with held_back():
-                recorder.add(step)
-            if audited(recorder.problem, step):
-                shown.say(_audit(recorder.report.content["audit"], case.units.length))
-            shown.advance(step.stage, step.stage_index + step.fraction, step.number, step.iterations)
+        with patient(shown.say) as interrupted:
+            for step in steps:
+                if isinstance(step, Stopped):
+                    recorder.stopped(step)
+                    return recorder.end("stopped", _why(step, recorder.problem), step.cutbacks)
+                if isinstance(step, Collapsed):
+                    return _found(step, recorder, shown)
+                with held_back():
+                    recorder.add(step)
+                if audited(recorder.problem, step):
+                    shown.say(_audit(recorder.report.content["audit"], case.units.length))
+                shown.advance(step.stage, step.stage_index + step.fraction, step.number, step.iterations)
+                if interrupted():
+                    return recorder.end("interrupted", INTERRUPTED)
     except KeyboardInterrupt:
-        return recorder.end("interrupted", "interrupted; all increments that converged are kept")
-    except OSError as error:
-        return "stopped", f"the results cannot be written: {error.strerror or error}"
+        return recorder.end("interrupted", INTERRUPTED)
     return recorder.end("completed", "")
 
 

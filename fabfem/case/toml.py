@@ -1,6 +1,6 @@
 """TOML text of the tables of a case.
 
-What is absent (``None``) is left out. An empty list is written: ``zones = []`` is a material for later, and no ``zones``
+What is absent (``None``) is left out. An empty list is written: ``zones = []`` is a material for later, no ``zones``
 is a material everywhere.
 """
 

@@ -7,7 +7,7 @@ from typing import Any
 from fabfem.case import CaseError, FabricCase
 from fabfem.case import fabric as said
 from fabfem.fabric_tests.drives import Measured, Value
-from fabfem.outcome import Description, Outcome, make_folder, short
+from fabfem.outcome import Description, Outcome, claimed, short, unwritten
 from fabfem.output.history import History
 from fabfem.output.interrupt import held_back
 from fabfem.output.report import Report
@@ -67,7 +67,15 @@ def run(case: FabricCase, folder: Path, quiet: bool, timer: Timer | None = None,
     timer = timer or Timer(PHASES)
     with timer.phase("laws"):
         measured = measure(case.drive, case)
-    make_folder(folder)
+    with claimed(folder):
+        try:
+            return _recorded(case, folder, measured, timer)
+        except OSError as error:
+            return unwritten(error, folder, timer.total())
+
+
+def _recorded(case: FabricCase, folder: Path, measured: Measured, timer: Timer) -> Outcome:
+    """Write the blocks of a table as they come and return how that ended."""
     for file in (*folder.glob("*.png"), folder / "history.csv"):
         file.unlink(missing_ok=True)
     history = History(folder / "history.csv", measured.headers)

@@ -144,6 +144,7 @@ def _read(path: Path) -> meshio.Mesh:
     """What meshio reads; its prints and its exit become one sentence."""
     if not path.is_file():
         raise MeshError(f"there is no mesh file {path}.")
+    _whole(path)
     for name, cell_type in _ABAQUS.items():
         abaqus_to_meshio_type.setdefault(name, cell_type)
     said = StringIO()
@@ -153,6 +154,14 @@ def _read(path: Path) -> meshio.Mesh:
     except (meshio.ReadError, LookupError, SystemExit, TypeError, ValueError) as error:
         reason = said.getvalue().partition("\n")[0] or str(error) or "unknown format"
         raise MeshError(f"{path.name} cannot be read as a mesh: {reason.rstrip('.')}.") from error
+
+
+def _whole(path: Path) -> None:
+    """Raise MeshError for an Abaqus file cut within a line: the format has no mark of its end, and a part reads well."""
+    if path.suffix.lower() == ".inp" and not path.read_bytes().endswith(b"\n"):
+        raise MeshError(
+            f"{path.name} ends within a line: it is cut short, or it lacks the line end behind the last one."
+        )
 
 
 def _middle_last(raw: meshio.Mesh, path: Path) -> meshio.Mesh:

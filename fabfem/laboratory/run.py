@@ -1,6 +1,6 @@
 """An element test from the case to the last row: lead the specimen through its stages, write, say how it ended."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path as Folder
 from typing import Any
 
@@ -13,8 +13,8 @@ from fabfem.identity import identity
 from fabfem.laboratory.record import PHASES, STANDING, Reached, Recorder, Written
 from fabfem.laboratory.specimen import Specimen, build
 from fabfem.laboratory.stages import End, path
-from fabfem.outcome import Description, Outcome, make_folder, short
-from fabfem.output.interrupt import held_back
+from fabfem.outcome import INTERRUPTED, Description, Outcome, claimed, short, unwritten
+from fabfem.output.interrupt import held_back, patient
 from fabfem.output.progress import Quiet, Terminal
 from fabfem.restart import FRESH, Restart, checkpoint_of
 from fabfem.timing import Timer
@@ -56,12 +56,14 @@ def run(
     start = begun.start if begun else Reached(0, specimen.state, np.zeros(6))
     if restart.branch is not None:
         _fits(specimen, start, restart)
-    make_folder(folder)
-    recorder = Recorder(
-        specimen, folder, timer, known, Written(**begun.written) if begun and restart.branch is None else None
-    )
-    with Quiet() if quiet else Terminal(len(case.stage)) as shown:
-        status, reason = _drive(specimen, recorder, shown, start)
+    written = Written(**begun.written) if begun and restart.branch is None else None
+    with claimed(folder):
+        try:
+            recorder = Recorder(specimen, folder, timer, known, written)
+            with Quiet() if quiet else Terminal(len(case.stage)) as shown:
+                status, reason = _drive(specimen, recorder, shown, start)
+        except OSError as error:
+            return unwritten(error, folder, timer.total())
     last = tuple((header, short(value)) for header, value in zip(recorder.headers, recorder.values, strict=False))
     return Outcome(status, reason, folder, recorder.count, last, timer.total())
 
@@ -92,48 +94,47 @@ def replay(case: ElementCase, start: Any) -> tuple[tuple[str, float, str] | None
 
 def _drive(specimen: Specimen, recorder: Recorder, shown: Quiet, start: Reached) -> tuple[str, str]:
     """Go through the stages from a start and return the status and the reason."""
-    state, strain = start.state, start.strain
     stages = specimen.case.stage
+    reached = start
     try:
-        for number, stage in enumerate(stages[start.number :], start.number):
-            with held_back():
-                recorder.keep(Reached(number, state, strain))
-            if isinstance(stage, Probe):
-                recorder.probe(stage, state)
-                continue
-            reached = Reached(number, state, strain)
-            strain = strain if stage.keep_strain else np.zeros(6)
-            state, strain, end = _path(specimen, stage, number, state, strain, recorder, shown)
-            if end.reason:
-                shown.say(f"{stage.name}: {end.status.replace('_', ' ')}: {end.reason}")
-            if end.status == "stopped":
-                fraction = float(recorder.values[STANDING.index("fraction [-]")])
-                keep_stage(specimen.case, recorder.folder, reached, (stage.name, fraction, end.reason))
-                sentence = f"stage {stage.name} stopped {end.reason}; all increments that converged are kept"
-                return recorder.end("stopped", sentence)
+        with patient(shown.say) as interrupted:
+            for number, stage in enumerate(stages[start.number :], start.number):
+                with held_back():
+                    recorder.keep(reached)
+                if isinstance(stage, Probe):
+                    recorder.probe(stage, reached.state)
+                    reached = reached._replace(number=number + 1)
+                    continue
+                state, strain, end = _path(specimen, stage, reached, recorder, shown, interrupted)
+                if end.reason:
+                    shown.say(f"{stage.name}: {end.status.replace('_', ' ')}: {end.reason}")
+                if end.status == "stopped":
+                    fraction = float(recorder.values[STANDING.index("fraction [-]")])
+                    keep_stage(specimen.case, recorder.folder, reached, (stage.name, fraction, end.reason))
+                    sentence = f"stage {stage.name} stopped {end.reason}; all increments that converged are kept"
+                    return recorder.end("stopped", sentence)
+                reached = Reached(number + 1, state, strain)
     except KeyboardInterrupt:
-        return recorder.end("interrupted", "interrupted; all increments that converged are kept")
-    except OSError as error:
-        return "stopped", f"the results cannot be written: {error.strerror or error}"
-    recorder.keep(Reached(len(stages), state, strain))
+        return recorder.end("interrupted", INTERRUPTED)
+    recorder.keep(reached)
     return recorder.end("completed", "")
 
 
 def _path(
-    specimen: Specimen, stage: Path, number: int, state: Any, strain: Array, recorder: Recorder, shown: Quiet
+    specimen: Specimen, stage: Path, reached: Reached, recorder: Recorder, shown: Quiet, interrupted: Callable[[], bool]
 ) -> tuple[Any, Array, End]:
     """Follow the path of a stage and return the state and the strain that it ends with, and how."""
+    state, strain = reached.state, reached.strain if stage.keep_strain else np.zeros(6)
     steps = path(specimen, stage, state, strain)
-    end = End("completed", "", 0, 0, 0.0)
     while True:
         with recorder.timer.phase("paths"):
             step = next(steps)
         if isinstance(step, End):
-            end = step
-            break
+            recorder.end_path(stage, step)
+            return state, strain, step
         with held_back():
             recorder.add(step)
         state, strain = step.state, step.strain
-        shown.advance(stage.name, number + min(max(step.fraction, 0.0), 1.0), step.increment, 1)
-    recorder.end_path(stage, end)
-    return state, strain, end
+        shown.advance(stage.name, reached.number + min(max(step.fraction, 0.0), 1.0), step.increment, 1)
+        if interrupted():
+            raise KeyboardInterrupt

@@ -18,7 +18,7 @@ from rich.console import Console
 
 from fabfem.case import Case, CaseError, read_case, read_tables
 from fabfem.case.study import Calibration, Fitted
-from fabfem.outcome import make_folder
+from fabfem.outcome import claimed
 from fabfem.output.atomic import write_atomic
 from fabfem.study.certainty import Certainty, blind_spots, certainty
 from fabfem.study.measured import Curves, answers, curve_table, measured_curves, residuals
@@ -52,9 +52,8 @@ def calibrate(path: Path, folder: Path, quiet: bool = False) -> Calibrated:
     case = read_case(path)
     said = asked(case, case.calibration, "calibration")
     measured = measured_curves(said, case.locate(said.data), path.name)
-    make_folder(folder)
     start = np.array([to_unit(fitted, fitted.start) for fitted in said.parameter])
-    with Pool(limits(said.workers, said.memory)) as pool:
+    with claimed(folder), Pool(limits(said.workers, said.memory)) as pool:
         fit = Fit(case, said, measured, read_tables(path), folder, pool, Console(stderr=True, quiet=quiet))
         return _write(fit, start, fit.solve(start))
 

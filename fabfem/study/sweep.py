@@ -16,7 +16,7 @@ from typing import Any, NamedTuple, TypeVar
 
 from fabfem.case import Case, CaseError, read_case, read_tables, suggest
 from fabfem.case.study import Sweep
-from fabfem.outcome import make_folder
+from fabfem.outcome import claimed
 from fabfem.output.atomic import write_atomic
 from fabfem.output.history import read_history
 from fabfem.study import compared, states
@@ -73,15 +73,14 @@ def sweep(path: Path, folder: Path, quiet: bool = False, pool: Pool | None = Non
     case = read_case(path)
     said = asked(case, case.sweep, "sweep")
     wanted = choices(said.parameter)
-    make_folder(folder)
     plan = Plan(read_tables(path), path, folder, wanted)
     done: dict[Any, Run] = {}
-    with nullcontext(pool) if pool else Pool(limits(said.workers, said.memory)) as processes:
+    with claimed(folder), nullcontext(pool) if pool else Pool(limits(said.workers, said.memory)) as processes:
         for run in shown(runs(plan, processes), len(wanted), quiet):
             done[run.choice] = run
             _write(folder / "sweep.csv", said, [done[choice] for choice in wanted if choice in done], case.path.name)
-    in_order = [done[choice] for choice in wanted if choice in done]
-    _conclude(case, said, in_order, folder)
+        in_order = [done[choice] for choice in wanted if choice in done]
+        _conclude(case, said, in_order, folder)
     ended = [run.ran.status for run in in_order]
     seconds = sum(median(run.ran.cpu) for run in in_order if run.ran.cpu)
     pictures = len(said.picture) + (said.measured is not None)

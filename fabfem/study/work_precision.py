@@ -17,7 +17,7 @@ import numpy as np
 
 from fabfem.case import Case, read_case, read_tables
 from fabfem.case.study import Study
-from fabfem.outcome import make_folder
+from fabfem.outcome import claimed
 from fabfem.output.atomic import write_atomic
 from fabfem.study.convergence import pareto
 from fabfem.study.processes import Pool, limits
@@ -59,14 +59,14 @@ def study(path: Path, folder: Path, quiet: bool = False) -> Studied:
     if said.truth is not None and said.truth.richardson is not None:
         knob_named(said, said.truth.richardson, path.name)
     wanted = wanted_choices(said)
-    make_folder(folder)
     plan = Plan(read_tables(path), path, folder, wanted, said.repeat)
-    with Pool(limits(said.workers, said.memory)) as pool:
-        found = {run.choice: run for run in shown(runs(plan, pool), len(wanted), quiet)}
-    values, troubles = _values(said, found)
-    known = truth(said, values, path.name)
-    rows = [_measured(said, found[choice], values, known, troubles) for choice in _listed(said, wanted)]
-    return _write(case, said, folder, rows, known, values)
+    with claimed(folder):
+        with Pool(limits(said.workers, said.memory)) as pool:
+            found = {run.choice: run for run in shown(runs(plan, pool), len(wanted), quiet)}
+        values, troubles = _values(said, found)
+        known = truth(said, values, path.name)
+        rows = [_measured(said, found[choice], values, known, troubles) for choice in _listed(said, wanted)]
+        return _write(case, said, folder, rows, known, values)
 
 
 def wanted_choices(said: Study) -> list[Choice]:

@@ -33,7 +33,7 @@ class Ran(NamedTuple):
     """What became of a task."""
 
     status: str
-    """``completed``, ``stopped``, ``refused`` (no case that can be run), ``failed`` or ``killed``."""
+    """``completed``, ``stopped``, ``refused`` (no case that can be run), ``unwritten``, ``failed`` or ``killed``."""
     reason: str
     """Why, in a sentence; empty when completed."""
     wall: tuple[float, ...] = ()
@@ -67,6 +67,7 @@ def serve(connection: Connection, threads: int) -> None:
 def perform(task: Task) -> Ran:
     """Return what becomes of a task; nothing is raised."""
     from fabfem.case import CaseError, case_from
+    from fabfem.outcome import FolderError
     from fabfem.output.report import peak_memory
 
     forget_peak_memory()
@@ -77,6 +78,8 @@ def perform(task: Task) -> Ran:
         status, reason = "completed", ""
         while len(wall) < task.repeat and status == "completed":
             status, reason = _timed(case, task.folder, wall, cpu)
+    except FolderError as error:
+        return Ran("failed", str(error))
     except CaseError as error:
         return Ran("refused", str(error))
     except Exception as error:

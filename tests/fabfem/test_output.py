@@ -98,7 +98,7 @@ def test_no_output_table_stores_no_fields(folder: Path) -> None:
     (folder / "case.toml").write_text(text[: text.index("[output]")], encoding="utf-8")
     run_case(folder / "case.toml", folder / "out", quiet=True)
     left = {file.name for file in (folder / "out").iterdir() if file.suffix != ".npz"}
-    assert left == {"history.csv", "report.json"}
+    assert left == {".lock", "history.csv", "report.json"}
 
 
 def test_a_killed_run_leaves_a_readable_result(folder: Path) -> None:

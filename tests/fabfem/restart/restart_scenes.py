@@ -67,11 +67,53 @@ def along(kind: dict[str, Any]) -> dict[str, Any]:
     return scene(METAL, {"name": "press", "kind": "load", "pressure": load, "control": kind, "increments": STEPS})
 
 
-TORSION = {
-    "scene": {"kind": "boundary_value", "kinematics": "axisymmetric_torsion"},
+AROUND = {
     "mesh": {"box": {"cells": [2, 2], "lower": [0.3, 0.0], "upper": [0.5, 0.4]}},
-    "support": [{"boundary": "bottom", "fix": ["x", "y", "theta"]}],
-    "probe": [{"name": "head", "boundary": "top", "component": "y"}],
+    "probe": [{"name": "head", "boundary": "top", "component": "z"}],
+    "reaction": [{"name": "base", "boundary": "bottom", "component": "z"}],
+}
+CONFINED = {
+    **{"name": "confined", "kind": "gravity", "initial_stress": 50.0},
+    "pressure": [{"boundary": ["left", "right", "top"], "value": 50.0}],
+}
+SHORTENED = {"boundary": "top", "r": 0.0, "z": -0.008}
+AXISYMMETRIC = AROUND | {
+    "scene": {"kind": "boundary_value", "kinematics": "axisymmetric"},
+    "support": [{"boundary": "bottom", "fix": ["r", "z"]}],
+    "stage": [CONFINED, {"name": "push", "kind": "load", "displacement": [SHORTENED], "increments": STEPS}],
+}
+TORSION = AROUND | {
+    "scene": {"kind": "boundary_value", "kinematics": "axisymmetric_torsion"},
+    "support": [{"boundary": "bottom", "fix": ["r", "z", "theta"]}],
+    "stage": [
+        CONFINED,
+        {
+            **{"name": "twist", "kind": "load", "displacement": [SHORTENED | {"z": -0.002, "theta": 0.008}]},
+            "increments": STEPS,
+        },
+    ],
+}
+# loads in proportion, led by the displacement that works with them; averages of a hollow cylinder and errors
+HOLLOW = AROUND | {
+    "scene": {"kind": "boundary_value", "kinematics": "axisymmetric_torsion"},
+    "support": [{"boundary": "bottom", "fix": ["z", "theta"]}],
+    "hollow_cylinder": {"inner": "left", "outer": "right", "platen": "top"},
+    "stage": [
+        CONFINED,
+        {
+            **{"name": "shear", "kind": "load", "rigid": [{"boundary": "top", "contact": "ribbed"}]},
+            "pressure": [{"boundary": ["left", "right"], "value": 35.0}, {"boundary": "top", "value": 80.0}],
+            "traction": [{"boundary": "top", "theta": 40.0}],
+            "control": {
+                **{"kind": "displacement", "change": 0.004},
+                "terms": [
+                    {"boundary": "top", "component": "z", "factor": -0.5},
+                    {"boundary": "top", "component": "theta", "factor": 0.866},
+                ],
+            },
+            "increments": STEPS,
+        },
+    ],
 }
 SOLID = {
     "scene": {"kind": "boundary_value", "kinematics": "solid"},
@@ -108,6 +150,9 @@ SCENES = {
         {"kind": "displacement", "terms": [{"boundary": "top", "component": "y"}], "change": -0.03}
     ),
     "solid": scene(METAL, **SOLID),
+    "axisymmetric": scene(MOHR, **AXISYMMETRIC),
+    "axisymmetric_torsion": scene(SAND | FABRIC, **TORSION),
+    "hollow_cylinder": scene(SAND | FABRIC, **HOLLOW, **ERRORS),
 }
 
 
