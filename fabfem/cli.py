@@ -1,16 +1,19 @@
 """The ``fabfem`` command.
 
 Exit status: 0 done, 1 the pictures could not be drawn, an answer of the verification or of an extreme is wrong, a
-replay ends otherwise or a UMAT breaks its contract, 2 bad input, 3 a run that could not go on (all that converged is
-kept), 130 interrupted. Nothing heavy is imported before a command needs it.
+replay ends otherwise or a UMAT breaks its contract, 2 bad input or a folder that takes no results, 3 a run that could
+not go on or not write its results (all that converged is kept), 130 interrupted. Nothing heavy is imported before a
+command needs it.
 """
 
 import argparse
+import os
 import sys
 from collections.abc import Sequence
 from pathlib import Path
 
 from fabfem import __version__
+from fabfem.authoring import add_commands
 
 DONE, NO_PICTURE, RED, BAD_INPUT, STOPPED, INTERRUPTED = 0, 1, 1, 2, 3, 130
 
@@ -28,6 +31,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return options.command(options)
     except KeyboardInterrupt:
         return _fail("interrupted before the first increment", INTERRUPTED)
+    except BrokenPipeError:  # whoever read the output, such as `head`, has seen enough
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return DONE
     except Exception as error:
         if options.debug:
             raise
@@ -227,6 +233,7 @@ def _parser() -> argparse.ArgumentParser:
     common.add_argument("--quiet", action="store_true", help="print nothing but errors")
     common.add_argument("--debug", action="store_true", help="show the traceback of an error")
     commands = parser.add_subparsers(title="commands", required=True, metavar="COMMAND")
+    add_commands(parser, commands, common)
 
     solve = commands.add_parser("solve", parents=[common], help="run a case and write its results")
     solve.add_argument("case", type=Path, metavar="CASE.toml")

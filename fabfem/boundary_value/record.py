@@ -22,6 +22,7 @@ from fabfem.output.checkpoints import PATTERN as CHECKPOINTS
 from fabfem.output.checkpoints import Checkpoint, Checkpoints
 from fabfem.output.history import History
 from fabfem.output.report import Report
+from fabfem.output.view import write_view
 from fabfem.output.vtu import FieldFiles, Frame
 from fabfem.timing import Timer
 
@@ -229,6 +230,7 @@ def _field_files(problem: Problem, folder: Path, stored: Sequence[tuple[float, s
         return None
     mesh = problem.model.space.mesh
     units = problem.case.unit_system
+    write_view(folder, problem.case.path.stem, problem.case.output.fields)
     note = f"fabfem: {SIGN}; length in {units.length}, stress in {units.label('stress')}"
     return FieldFiles(folder, mesh.points, mesh.cells, mesh.cell_type, note, stored)
 

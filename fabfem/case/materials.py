@@ -1,9 +1,10 @@
 """What a case may say about its materials, one table ``[material.NAME]`` each, told apart by ``model``."""
 
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import Field, field_validator
 
+from fabfem.case.sentences import CaseError
 from fabfem.case.table import Angle, NotNegative, Positive, SomeNames, Table, Text
 
 SOLID_FRACTION_LIMIT = 13.28 / 8.0
@@ -166,3 +167,21 @@ class Umat(Material):
 AnyMaterial = Annotated[
     Elastic | VonMises | MohrCoulomb | DruckerPrager | ChangHicher | Umat, Field(discriminator="model")
 ]
+
+
+def spelled_out(tables: dict[str, Any]) -> dict[str, Any]:
+    """Return the tables of a case with every ``umat = LIBRARY`` as ``model = "umat"`` and ``library``."""
+    materials = tables.get("material")
+    if not isinstance(materials, dict):
+        return tables
+    return tables | {"material": {name: _spelled_out(name, table) for name, table in materials.items()}}
+
+
+def _spelled_out(name: str, table: Any) -> Any:
+    if not isinstance(table, dict) or "umat" not in table:
+        return table
+    for key in ("model", "library"):
+        if key in table:
+            raise CaseError(f"material.{name}.umat: says model and library in one; leave {key} out")
+    rest = {key: value for key, value in table.items() if key != "umat"}
+    return {"model": "umat", "library": table["umat"], **rest}

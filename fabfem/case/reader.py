@@ -13,6 +13,7 @@ from fabfem.case.element import ElementCase
 from fabfem.case.element import contradictions as element_contradictions
 from fabfem.case.fabric import FabricCase
 from fabfem.case.fabric import contradictions as fabric_contradictions
+from fabfem.case.materials import spelled_out
 from fabfem.case.schema import Case
 from fabfem.case.sentences import CaseError, sentence
 from fabfem.case.table import suggest
@@ -46,6 +47,10 @@ def read_case(path: str | Path) -> Case:
 def case_from(tables: dict[str, Any], path: str | Path = "case.toml") -> Case:
     """Return the case made of tables that were read already; relative files are looked up beside ``path``."""
     path = Path(path)
+    try:
+        tables = spelled_out(tables)
+    except CaseError as error:
+        raise CaseError(f"{path.name}: {error}") from None
     schema, contradicted = KINDS[_kind(tables, path)]
     try:
         case = schema.model_validate(tables)

@@ -82,7 +82,7 @@ def from_meshio(raw: meshio.Mesh) -> Mesh:
     facets = _facets(cells, element)
     zones: dict[str, np.ndarray] = {}
     boundaries: dict[str, np.ndarray] = {}
-    for name, blocks in raw.cell_sets.items():
+    for name, blocks in (raw.cell_sets or _physical(raw)).items():
         if not name.startswith("gmsh:"):
             _add(zones, name, _elements_in(raw, blocks, cell_type))
             _add(boundaries, name, _matching(facets, _facets_in(raw, blocks, element.facet_type), element))
@@ -157,7 +157,7 @@ def _read(path: Path) -> meshio.Mesh:
 
 
 def _whole(path: Path) -> None:
-    """Raise MeshError for an Abaqus file cut within a line: the format has no mark of its end, and a part reads well."""
+    """Raise MeshError for an Abaqus file cut within a line: the format does not mark its end, and a part reads well."""
     if path.suffix.lower() == ".inp" and not path.read_bytes().endswith(b"\n"):
         raise MeshError(
             f"{path.name} ends within a line: it is cut short, or it lacks the line end behind the last one."
@@ -180,6 +180,19 @@ _ABAQUS = {
     for reduced in ("", "R")
 }
 """Abaqus's plane and axisymmetric elements, of which meshio knows three."""
+
+
+def _physical(raw: meshio.Mesh) -> dict[str, list[np.ndarray]]:
+    """Numbers, by block, of the cells in each physical group: gmsh's format 2.2, of which meshio makes no sets."""
+    tags = raw.cell_data.get("gmsh:physical", [])
+    dims = [meshio._mesh.topological_dimension[block.type] for block in raw.cells]
+    return {
+        name: [
+            np.flatnonzero(tag == group) if dim == of else np.zeros(0, int) for tag, of in zip(tags, dims, strict=True)
+        ]
+        for name, (group, dim) in raw.field_data.items()
+        if len(tags)
+    }
 
 
 def _cell_type(types: Iterable[str]) -> str:

@@ -11,6 +11,7 @@ import zlib
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
+from xml.etree import ElementTree
 from xml.sax.saxutils import quoteattr
 
 import numpy as np
@@ -104,6 +105,13 @@ class FieldFiles:
         entries = [f'<DataSet timestep="{time!r}" part="0" file="{name}"/>' for time, name in self.stored]
         head = f'<?xml version="1.0"?>\n<!-- {self.note} -->\n<VTKFile type="Collection" version="1.0"><Collection>'
         return "\n".join([head, *entries, "</Collection></VTKFile>\n"])
+
+
+def frames_of(folder: Path) -> list[tuple[float, Path]]:
+    """Return time and file of each stored increment of a result, in order; none where nothing is stored."""
+    collection = folder / "fields.pvd"
+    entries = ElementTree.parse(collection).iter("DataSet") if collection.is_file() else ()
+    return [(float(entry.attrib["timestep"]), folder / entry.attrib["file"]) for entry in entries]
 
 
 def _geometry(points: NDArray[np.float64], cells: NDArray[np.integer], cell_type: str) -> str:

@@ -20,7 +20,10 @@ from fabfem.study.processes import LEAST, Job, Pool
 from fabfem.study.variants import ABOUT_RUNS, Choice, Tables, variant
 from fabfem.study.worker import FINAL, Ran, Task
 
-ASIDE = ("cli.py", "gallery.py", "study", "pictures", "__main__.py", "case/study.py")
+ASIDE = (
+    *("__main__.py", "authoring.py", "case/json_schema.py", "case/study.py", "cli.py", "gallery.py"),
+    *("pictures", "result.py", "starters", "study"),
+)
 """Parts of the package that decide no result of a run."""
 
 

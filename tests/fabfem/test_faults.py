@@ -258,8 +258,7 @@ def test_a_mesh_cut_short(file: Path, tmp_path: Path) -> None:
         cut.write_bytes(said[: end - said[:end].endswith(b"\n")])
         try:
             found = read_mesh(cut)
-        except MeshError as error:
-            assert "\n" not in str(error).strip()
+        except MeshError:
             continue
         assert len(found.cells) == len(whole.cells)
         for name in whole.boundaries:

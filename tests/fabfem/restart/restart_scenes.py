@@ -6,6 +6,7 @@ SAND = {
     **{"model": "chang_hicher", "preset": "toyoura", "void_ratio": 0.69, "unit_weight": 15.3},
     **{"directions": "lebedev_17", "parameters": {"open_pressure": 1e-3}},
 }
+LEVEL = {"fabric": {"law": "zhao_kruyt", "norm": 0.208}}
 FABRIC = {"fabric": {"law": "zhao_kruyt", "norm": 0.208, "bedding_angle": 30.0}}
 STIFFNESS = {"youngs_modulus": 2e4, "poisson_ratio": 0.25, "unit_weight": 16.0}
 MOHR = STIFFNESS | {"model": "mohr_coulomb", "friction_angle": 30.0, "dilation_angle": 5.0, "cohesion": 2.0}
@@ -151,8 +152,8 @@ SCENES = {
     ),
     "solid": scene(METAL, **SOLID),
     "axisymmetric": scene(MOHR, **AXISYMMETRIC),
-    "axisymmetric_torsion": scene(SAND | FABRIC, **TORSION),
-    "hollow_cylinder": scene(SAND | FABRIC, **HOLLOW, **ERRORS),
+    "axisymmetric_torsion": scene(SAND | LEVEL, **TORSION),
+    "hollow_cylinder": scene(SAND | LEVEL, **HOLLOW, **ERRORS),
 }
 
 
