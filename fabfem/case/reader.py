@@ -68,7 +68,7 @@ def _kind(tables: dict[str, Any], path: Path) -> str:
     kind = scene.get("kind") if isinstance(scene, dict) else None
     if kind is None:
         return "boundary_value"
-    if kind not in KINDS:
+    if not isinstance(kind, str) or kind not in KINDS:
         known = ", ".join(f"'{name}'" for name in KINDS)
         raise CaseError(f"{path.name}: scene.kind: must be one of {known} (got {kind!r}){suggest(str(kind), KINDS)}")
     return kind
