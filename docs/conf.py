@@ -30,17 +30,22 @@ suppress_warnings = ["ref.python"]
 html_theme = "furo"
 html_title = f"fabfem {release}"
 
-ROOT_FILES = {"start": "README.md", "contributing": "CONTRIBUTING.md", "changelog": "CHANGELOG.md"}
-"""Pages that are files of the root folder, whose links start there."""
+ROOT_FILES = {
+    **{"start": "README.md", "contributing": "CONTRIBUTING.md", "changelog": "CHANGELOG.md"},
+    "gallery": "cases/README.md",
+}
+"""Pages that are files of other folders, whose links start there."""
 
 
 def read_root_file(app: Any, page: str, source: list[str]) -> None:
-    """Put a file of the root folder into its page, with links that hold there."""
+    """Put a file of another folder into its page, and let links to such files lead to their pages."""
+    text = source[0]
     if page in ROOT_FILES:
-        text = (Path(__file__).parent.parent / ROOT_FILES[page]).read_text(encoding="utf-8").replace("](docs/", "](")
-        for name, file in ROOT_FILES.items():
-            text = text.replace(f"]({file})", f"]({name}.md)")
-        source[0] = text.replace("[CITATION.cff](CITATION.cff)", "`CITATION.cff`")
+        text = (Path(__file__).parent.parent / ROOT_FILES[page]).read_text(encoding="utf-8")
+        text = text.replace("](docs/", "](").replace("](../docs/", "](")
+    for name, file in ROOT_FILES.items():
+        text = text.replace(f"]({file})", f"]({name}.md)").replace(f"](../{file})", f"]({name}.md)")
+    source[0] = text.replace("[CITATION.cff](CITATION.cff)", "`CITATION.cff`")
 
 
 def keep_bars(app: Any, what: str, name: str, found: Any, options: Any, lines: list[str]) -> None:

@@ -2,8 +2,8 @@
 
 ``python tests/benchmarks/fuzz_cases.py --count 2000 [--seed 1] [--solve 60] [--seconds 10]`` checks that many mutants
 by ``fabfem check`` and solves some of those that are accepted, for a few seconds each. A mutant is a shipped case in
-which one to three things are wrong: in its tables (a key left out, misspelt, moved or given twice; a value of another type,
-sign or size, not finite, empty) or in its text (characters, lines, bytes, the end). It ends in one of these ways:
+which one to three things are wrong: in its tables (a key left out, misspelt, moved or given twice; a value of another
+type, sign or size, not finite, empty) or in its text (characters, lines, bytes, the end). It ends in one of these ways:
 
 =================  ====================================================================================================
 refused            status 2 and one line that names the file, or a place in it
