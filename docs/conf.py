@@ -1,5 +1,6 @@
 """Sphinx: ``python -m sphinx -W -b html docs build/docs`` builds the site, with what ``fabfem[docs]`` brings."""
 
+import re
 from pathlib import Path
 from typing import Any
 
@@ -36,15 +37,20 @@ ROOT_FILES = {
 }
 """Pages that are files of other folders, whose links start there."""
 
+NAMED_BY_FILE = re.compile(r"\[(?:docs/|cases/)?\w+\.md\]\(")
+"""Links that have a file for their text, which in the site is the title of the page."""
+
 
 def read_root_file(app: Any, page: str, source: list[str]) -> None:
     """Put a file of another folder into its page, and let links to such files lead to their pages."""
     text = source[0]
     if page in ROOT_FILES:
-        text = (Path(__file__).parent.parent / ROOT_FILES[page]).read_text(encoding="utf-8")
-        text = text.replace("](docs/", "](").replace("](../docs/", "](")
-    for name, file in ROOT_FILES.items():
-        text = text.replace(f"]({file})", f"]({name}.md)").replace(f"](../{file})", f"]({name}.md)")
+        file = Path(__file__).parent.parent / ROOT_FILES[page]
+        app.env.note_dependency(str(file))
+        text = file.read_text(encoding="utf-8").replace("](docs/", "](").replace("](../docs/", "](")
+    text = NAMED_BY_FILE.sub("[](", text)
+    for name, there in ROOT_FILES.items():
+        text = text.replace(f"]({there})", f"]({name}.md)").replace(f"](../{there})", f"]({name}.md)")
     source[0] = text.replace("[CITATION.cff](CITATION.cff)", "`CITATION.cff`")
 
 

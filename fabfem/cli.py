@@ -9,6 +9,7 @@ command needs it.
 import argparse
 import os
 import sys
+import warnings
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -28,7 +29,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """
     options = _parser().parse_args(arguments)
     try:
-        return options.command(options)
+        with warnings.catch_warnings():
+            if not options.debug:  # numbers out of all proportion overflow; what is not finite is refused with a reason
+                warnings.filterwarnings("ignore", category=RuntimeWarning, module="numpy|scipy")
+            return options.command(options)
     except KeyboardInterrupt:
         return _fail("interrupted before the first increment", INTERRUPTED)
     except BrokenPipeError:  # whoever read the output, such as `head`, has seen enough
