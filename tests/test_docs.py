@@ -33,9 +33,11 @@ def test_the_site_builds_without_a_warning(tmp_path: Path) -> None:
 
 
 PAGES = ["README.md", "CONTRIBUTING.md", *sorted(str(file.relative_to(ROOT)) for file in (ROOT / "docs").glob("*.md"))]
-BLOCK = re.compile(r"(?:<!-- (not run|parsed|into): (.*?) -->\n)?^```(\S*)\n(.*?)^```", re.MULTILINE | re.DOTALL)
+BLOCK = re.compile(
+    r"(?:<!-- (not run|parsed|into|prints)(?:: (.*?))? -->\n)?^```(\S*)\n(.*?)^```", re.MULTILINE | re.DOTALL
+)
 NO_CODE = ("", "{toctree}", "{eval-rst}")
-INSTALLING = re.compile(r"python3 -m venv .venv && .venv/bin/pip install \S+ && ")
+INSTALLING = re.compile(r"^(python3 -m venv .venv|.venv/bin/pip install .)$", re.MULTILINE)
 GIVEN = {
     "docs/architecture.md": """
 import numpy as np, umat
@@ -80,15 +82,14 @@ def shell(code: str, ground: Path) -> None:
     assert done.returncode == 0, done.stderr
 
 
-def python(code: str, page: str, ground: Path, before: str) -> str:
-    """Run a block after those before it on the page; return them all."""
-    whole = "\n".join([before or GIVEN.get(page, ""), code])
+def python(code: str, ground: Path) -> str:
+    """Run a program and return what it prints."""
     environment = os.environ | {"PYTHONPATH": str(ROOT)}
     done = subprocess.run(
-        [sys.executable, "-c", whole], cwd=ground, env=environment, capture_output=True, text=True, check=False
+        [sys.executable, "-c", code], cwd=ground, env=environment, capture_output=True, text=True, check=False
     )
     assert done.returncode == 0, done.stderr
-    return whole
+    return done.stdout
 
 
 def parsed(line: str) -> None:
@@ -125,9 +126,11 @@ def case(code: str, mark: str, where: str, ground: Path) -> None:
 @pytest.mark.parametrize("page", [page for page in PAGES if any(block[2] not in NO_CODE for block in blocks(page))])
 def test_the_code_of_a_page(page: str, ground: Path) -> None:
     """Every block runs, in the order of the page, or says why it does not."""
-    before = ""
+    before, said = GIVEN.get(page, ""), ""
     for mark, reason, language, code in blocks(page):
-        if language in NO_CODE or mark == "not run":
+        if mark == "prints":
+            assert said.endswith(code), said
+        elif language in NO_CODE or mark == "not run":
             assert language in NO_CODE or len(reason) > 10
         elif mark == "parsed":
             assert len(reason) > 10
@@ -136,7 +139,8 @@ def test_the_code_of_a_page(page: str, ground: Path) -> None:
         elif language == "sh":
             shell(code, ground)
         elif language == "python":
-            before = python(code, page, ground, before)
+            before += code  # goes on from the blocks before it
+            said = python(before, ground)
         else:
             assert language == "toml", f"{page}: nothing runs {language}"
             case(code, mark, reason, ground)
