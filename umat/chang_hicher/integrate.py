@@ -8,6 +8,8 @@ A round evaluates residual and Jacobian at the trial state of every lane at once
   packing has opened and the rest of the increment is a gap; out of means, a status code, nothing written.
 """
 
+import numpy as np
+
 from ..fabric.law import active_inputs, increments
 from ..lanes import LANES, entry, kernel, spot
 from .balance import friction_columns, geometry, strain_and_slope
@@ -92,13 +94,13 @@ def fill(constants, rule, pool, data, out, order, following, l):
 
 
 @kernel
-def solve_lanes(law, constants, rule, components, pool, equilibrium, width):
+def solve_lanes(law, constants, rule, components, pool, balanced, width):
     """Solve every lane's system for the Newton step, and where some lane is in equilibrium for tangent and error."""
     rows, evolving = pool.rows, constants.evolving
     n = components.shape[0] * (2 if evolving else 1)
     factorise(rows, MATRIX, n, width)
     solve(rows, MATRIX, NEWTON, n, 1, width)
-    if not equilibrium:
+    if balanced == 0:
         return
     if evolving:
         law_inputs(rows, 1.0, width)
@@ -136,22 +138,22 @@ def move(pool, source, target):
 def integrate(law, constants, rule, terms, pool, data, out, order):
     """Integrate the points of `order`, one after another as lanes become free; see the module's docstring."""
     components, count = terms.components, pool.counts
-    following, held = 0, 0
+    following, held = np.int64(0), np.int64(0)
     while held < LANES and following < order.shape[0]:
         following = fill(constants, rule, pool, data, out, order, following, held)
-        held += count[CODE, held] != IDLE
+        held += np.int64(count[CODE, held] != IDLE)
     while held > 0:
         # lanes in use lie side by side at the front; the few beyond them fill the vector
         width = min(VECTOR * ((held + VECTOR - 1) // VECTOR), LANES)
-        solving, equilibrium = False, False
+        solving, balanced = np.int64(0), np.int64(0)
         evaluate(law, constants, rule, terms, pool, width)
         for l in range(held):
             count[CODE, l] = judge(constants, rule.weights.shape[0], pool, l)
-            solving = solving or count[CODE, l] != TRIAL
-            equilibrium = equilibrium or count[CODE, l] == EQUILIBRIUM
-        if not solving:
+            solving += count[CODE, l] != TRIAL
+            balanced += count[CODE, l] == EQUILIBRIUM
+        if solving == 0:
             continue
-        solve_lanes(law, constants, rule, components, pool, equilibrium, width)
+        solve_lanes(law, constants, rule, components, pool, balanced, width)
         for l in range(held - 1, -1, -1):
             if count[CODE, l] > TRIAL:
                 if settle(constants, components, rule, pool, data[6], out, l):

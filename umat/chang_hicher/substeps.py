@@ -138,24 +138,40 @@ def reason(constants, rule, pool, l):
 
 
 @kernel
-def cut(constants, rule, pool, out, factor, lost, l):
-    """Shorten or relax the sub-step; when that is over, open the point or refuse it, and return True.
+def lost(constants, rule, pool, out, l):
+    """Act on a sub-step without equilibrium; return True when the point is finished.
 
-    lost: no equilibrium was found. Short sub-steps without one are relaxed: see the module's docstring.
+    First the share of sliding is raised in steps; then the sub-step is cut, or relaxed where it is short: see the
+    module's docstring.
     """
     rows = pool.rows
-    if lost and rows[spot(RAISING, l)] == 0.0:
+    if rows[spot(RAISING, l)] == 0.0:
         rows[spot(RAISING, l)], rows[spot(SHARE, l)] = 1.0, FIRST_SHARE
         if pool.counts[EVALUATIONS, l] < constants.max_evaluations:
             begin(pool, l)
             return False
+    share = 1.0 if rows[spot(RAISING, l)] == 1.0 else rows[spot(SHARE, l)]
+    if rows[spot(PORTION, l)] > RELAXABLE or 0.25 * share < constants.least_share:
+        return cut(constants, rule, pool, out, 0.25, l)
+    rows[spot(RAISING, l)], rows[spot(SHARE, l)] = 2.0, 0.25 * share
+    return go_on(constants, rule, pool, out, l)
+
+
+@kernel
+def cut(constants, rule, pool, out, factor, l):
+    """Shorten the sub-step; return True when that is over and the point finished."""
+    rows = pool.rows
     if rows[spot(RAISING, l)] == 1.0:
-        rows[spot(RAISING, l)], rows[spot(SHARE, l)] = 2.0, 1.0
-    if lost and rows[spot(PORTION, l)] <= RELAXABLE and 0.25 * rows[spot(SHARE, l)] >= constants.least_share:
-        rows[spot(SHARE, l)] *= 0.25
-    else:
-        rows[spot(PORTION, l)] *= factor
-        rows[spot(RAISING, l)] = 0.0
+        rows[spot(SHARE, l)] = 1.0
+    rows[spot(RAISING, l)] = 0.0
+    rows[spot(PORTION, l)] *= factor
+    return go_on(constants, rule, pool, out, l)
+
+
+@kernel
+def go_on(constants, rule, pool, out, l):
+    """Begin the sub-step again; out of means open the point or refuse it, and return True."""
+    rows = pool.rows
     if rows[spot(PORTION, l)] >= SMALLEST and pool.counts[EVALUATIONS, l] < constants.max_evaluations:
         begin(pool, l)
         return False
@@ -176,7 +192,7 @@ def opening(constants, rule, pool, out, p, l):
     """
     rows = pool.rows
     if rows[spot(PORTION, l)] > CROSSING:
-        return cut(constants, rule, pool, out, 0.25, False, l)
+        return cut(constants, rule, pool, out, 0.25, l)
     start, least = np.sqrt(old_pressure(rows, l)), np.sqrt(constants.open_pressure)
     before = (start - least) / (start - np.sqrt(p)) if start > least else 0.0
     open_point(constants, rule, pool, out, before, l)
@@ -190,7 +206,7 @@ def settle(constants, components, rule, pool, strain, out, l):
     if pool.counts[CODE, l] == ITERATE and take_step(pool, components, constants.evolving, l):
         return False
     if pool.counts[CODE, l] != EQUILIBRIUM:
-        return cut(constants, rule, pool, out, 0.25, True, l)
+        return lost(constants, rule, pool, out, l)
     correct(pool, components, constants.evolving, l)
     if rows[spot(RAISING, l)] == 1.0 and rows[spot(SHARE, l)] < 1.0:
         rows[spot(SHARE, l)] *= RAISE
@@ -205,7 +221,7 @@ def settle(constants, components, rule, pool, strain, out, l):
         factor *= 0.5
     relaxed = rows[spot(SHARE, l)] < 1.0
     if not error <= constants.tolerance and rows[spot(PORTION, l)] * factor >= SMALLEST and not relaxed:
-        return cut(constants, rule, pool, out, factor, False, l)
+        return cut(constants, rule, pool, out, factor, l)
     rows[spot(ERROR, l)] += error
     pool.counts[SUBSTEPS, l] += 1
     collect(pool, components, constants.evolving, l)
