@@ -36,6 +36,7 @@ from .rows import (
     FRICTION,
     LATE,
     MARGIN,
+    PART,
     SHARE,
     SLIPPED,
     STIFFNESS,
@@ -45,7 +46,9 @@ from .rows import (
 )  # fmt: skip
 
 TINY = 1e-200
+HALF_SQRT2 = 0.5 * 2.0**0.5
 SIZE = BUFFER * LANES
+VERGE = 0.01  #: relative distance from sliding below which the first look at a sub-step asks where the contact goes
 GROUP = 4  #: directions whose contributions are added in one pass over the sums
 
 
@@ -114,7 +117,6 @@ def contact_plane(rows, before, after, kept, tried, out, n, weight, elastic, wid
         done = before[l]
         share = rows[at(SHARE, l)]
         slip = share * np.maximum(required - done, 0.0)
-        on = select(required > done, share, 0.0)
         after[l] = done + slip
         # the sliding that the last linear step foresaw; `kept` is where it began
         taken = rows[at(TAKEN, l)] > 0.5
@@ -131,6 +133,13 @@ def contact_plane(rows, before, after, kept, tried, out, n, weight, elastic, wid
         ax, ay, az = tx * i_ft, ty * i_ft, tz * i_ft
         along_n = (0.5 * push * tan_p * i_fn - slid * tan_p) * i_room
         along_t = (ease_p * compliance * s * tan_p + slid) * i_room
+        # which contacts slide: at first those on the verge of it that a uniform strain would load
+        lx = rows[at(PART, l)] * nx + HALF_SQRT2 * (rows[at(PART + 5, l)] * ny + rows[at(PART + 4, l)] * nz)
+        ly = rows[at(PART + 1, l)] * ny + HALF_SQRT2 * (rows[at(PART + 5, l)] * nx + rows[at(PART + 3, l)] * nz)
+        lz = rows[at(PART + 2, l)] * nz + HALF_SQRT2 * (rows[at(PART + 4, l)] * nx + rows[at(PART + 3, l)] * ny)
+        trend = ease_t * along_n * (lx * nx + ly * ny + lz * nz) + along_t * (lx * ax + ly * ay + lz * az)
+        verge = VERGE * rows[at(FRESH, l)] * done
+        on = select(required > done - select(trend > 0.0, verge, -verge), share, 0.0)
         qx, qy, qz = (
             on * (along_n * nx + along_t * ax),
             on * (along_n * ny + along_t * ay),

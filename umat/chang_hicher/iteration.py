@@ -35,6 +35,7 @@ from .rows import (
 )  # fmt: skip
 
 NEWTON_TOLERANCE = 1e-8  #: of the residual strain before the last correction, relative to the sub-step
+SMALL, QUADRATIC = 1e-5, 3e-4  #: the same if it fell by this factor in the last step: see `converged`
 NEWTON_FLOOR = 2e-15  #: of the residual strain, absolute: the rounding of the sums
 STALLED = 1e-6  #: residual relative to the sub-step that is taken when it falls no more
 MAX_ITERATIONS = 14
@@ -111,6 +112,17 @@ def shorten(pool, count, l):
 
 
 @kernel
+def converged(norm, previous, length):
+    """Return whether the last correction and the tangent are good enough at a residual.
+
+    Where Newton converges quadratically the relative change of the Jacobian in the correction to come is about twice
+    (norm/previous)², and so is what the correction leaves of the residual.
+    """
+    falling = norm <= SMALL * length and norm <= QUADRATIC * previous
+    return falling or norm <= NEWTON_TOLERANCE * length + NEWTON_FLOOR
+
+
+@kernel
 def judge(constants, count, pool, l):
     """Return what a lane does with the state just evaluated; count: contact directions."""
     rows, counts = pool.rows, pool.counts
@@ -131,7 +143,7 @@ def judge(constants, count, pool, l):
     counts[TRIES, l] = 0
     counts[ITERATIONS, l] += 1
     stalled = norm <= STALLED * length + 10.0 * NEWTON_FLOOR and norm > 0.5 * best
-    if norm <= NEWTON_TOLERANCE * length + NEWTON_FLOOR or stalled:
+    if converged(norm, best, length) or stalled:
         return EQUILIBRIUM
     if counts[ITERATIONS, l] > MAX_ITERATIONS or counts[EVALUATIONS, l] >= constants.max_evaluations:
         return CUT
