@@ -9,13 +9,15 @@ points that needed more than one sub-step pass here.
 
 import numpy as np
 
+from ..fabric.law import scaled
 from ..lanes import kernel, spot
-from .balance import HALF_SQRT2, contact_density, critical_void_ratio, inverse_fabric
+from .balance import HALF_SQRT2, contact_density, critical_void_ratio, inverse_fabric, matrix, plain, times
 from .contact import TINY
 from .rows import (
     BY_FABRIC,
     BY_VOID,
     DILATANCY,
+    FABRIC,
     FABRIC_MIDDLE,
     FORCE,
     FORCE_OLD,
@@ -205,29 +207,31 @@ def carried(rows, slide, base, rule, constants, change, dz, dslide, out, small, 
 
 
 @kernel
+def six_of(rows, first, l):
+    """Return six numbers of lane l."""
+    return (
+        rows[spot(first, l)],
+        rows[spot(first + 1, l)],
+        rows[spot(first + 2, l)],
+        rows[spot(first + 3, l)],
+        rows[spot(first + 4, l)],
+        rows[spot(first + 5, l)],
+    )
+
+
+@kernel
 def start_force(rows, total, l):
     """Fill Z at the start of an increment: σ G⁻¹ / c(e), or nothing where forces are kept direction by direction."""
     for i in range(9):
         rows[spot(FORCE_OLD + i, l)] = 0.0
     if not total:
         return
-    h = HALF_SQRT2
-    a, b, c = rows[spot(OLD, l)], rows[spot(OLD + 1, l)], rows[spot(OLD + 2, l)]
-    d, e, f = h * rows[spot(OLD + 3, l)], h * rows[spot(OLD + 4, l)], h * rows[spot(OLD + 5, l)]
-    ga, gb, gc, gd, ge, gf = inverse_fabric(
-        rows[spot(OLD + 6, l)],
-        rows[spot(OLD + 7, l)],
-        rows[spot(OLD + 8, l)],
-        h * rows[spot(OLD + 9, l)],
-        h * rows[spot(OLD + 10, l)],
-        h * rows[spot(OLD + 11, l)],
-    )
-    scale = 1.0 / contact_density(rows[spot(OLD + 12, l)])[0]
-    entries = (a * ga + f * gf + e * ge, a * gf + f * gb + e * gd, a * ge + f * gd + e * gc,
-            f * ga + b * gf + d * ge, f * gf + b * gb + d * gd, f * ge + b * gd + d * gc,
-            e * ga + d * gf + c * ge, e * gf + d * gb + c * gd, e * ge + d * gd + c * gc)  # fmt: skip
+    stress, fabric = six_of(rows, OLD, l), six_of(rows, OLD + FABRIC, l)
+    inverse = inverse_fabric(plain(fabric))
+    scale = 1.0 / contact_density(rows[spot(OLD + VOID, l)])[0]
+    entries = times(matrix(plain(stress)), matrix(scaled(scale, inverse)))
     for i in range(9):
-        rows[spot(FORCE_OLD + i, l)] = entries[i] * scale
+        rows[spot(FORCE_OLD + i, l)] = entries[i]
 
 
 @kernel

@@ -17,6 +17,7 @@ from .rows import (
     BY_VOID_STRAIN,
     FABRIC,
     FACTOR,
+    FINAL,
     FRACTION,
     FRESH,
     FULL,
@@ -37,6 +38,7 @@ from .rows import (
 NEWTON_TOLERANCE = 1e-8  #: of the residual strain before the last correction, relative to the sub-step
 SMALL, QUADRATIC = 1e-5, 3e-4  #: the same if it fell by this factor in the last step: see `converged`
 NEWTON_FLOOR = 2e-15  #: of the residual strain, absolute: the rounding of the sums
+NEAR = 0.1  #: residual relative to the sub-step from which the next one is expected to be the last
 STALLED = 1e-6  #: residual relative to the sub-step that is taken when it falls no more
 MAX_ITERATIONS = 14
 MAX_TRIES = 10  #: at one Newton step
@@ -66,7 +68,7 @@ def again(pool, l):
     """Begin to iterate from the trial state."""
     rows = pool.rows
     rows[spot(FACTOR, l)], rows[spot(FRESH, l)], rows[spot(TAKEN, l)] = 1.0, 1.0, 1.0
-    rows[spot(BEST, l)] = np.inf
+    rows[spot(BEST, l)], rows[spot(FINAL, l)] = np.inf, 0.0
     pool.counts[ITERATIONS, l] = 0
     pool.counts[TRIES, l] = 0
 
@@ -106,7 +108,7 @@ def reach(pool, count, l):
 def shorten(pool, count, l):
     """Set the next trial of a Newton step that left the domain."""
     pool.rows[spot(FACTOR, l)] *= reach(pool, count, l)
-    pool.rows[spot(TAKEN, l)] = 0.0
+    pool.rows[spot(TAKEN, l)], pool.rows[spot(FINAL, l)] = 0.0, 0.0
     pool.counts[TRIES, l] += 1
     place_trial(pool.rows, l)
 
@@ -120,6 +122,13 @@ def converged(norm, previous, length):
     """
     falling = norm <= SMALL * length and norm <= QUADRATIC * previous
     return falling or norm <= NEWTON_TOLERANCE * length + NEWTON_FLOOR
+
+
+@kernel
+def once_more(rows, l):
+    """Ask for a full evaluation of the same state; estimates of the sliding stay what they were."""
+    rows[spot(FINAL, l)], rows[spot(TAKEN, l)] = 1.0, 0.0
+    return TRIAL
 
 
 @kernel
@@ -139,12 +148,14 @@ def judge(constants, count, pool, l):
             shorten(pool, count, l)
         out_of_means = counts[TRIES, l] > MAX_TRIES or counts[EVALUATIONS, l] >= constants.max_evaluations
         return CUT if out_of_means else TRIAL
+    stalled = norm <= STALLED * length + 10.0 * NEWTON_FLOOR and norm > 0.5 * best
+    if converged(norm, best, length) or stalled:
+        if rows[spot(FINAL, l)] == 0.0:
+            return once_more(rows, l)
+        return EQUILIBRIUM
     rows[spot(BEST, l)] = norm
     counts[TRIES, l] = 0
     counts[ITERATIONS, l] += 1
-    stalled = norm <= STALLED * length + 10.0 * NEWTON_FLOOR and norm > 0.5 * best
-    if converged(norm, best, length) or stalled:
-        return EQUILIBRIUM
     if counts[ITERATIONS, l] > MAX_ITERATIONS or counts[EVALUATIONS, l] >= constants.max_evaluations:
         return CUT
     for i in range(12):
@@ -166,6 +177,7 @@ def take_step(pool, components, evolving, l):
             rows[spot(STEP + FABRIC + components[row], l)] = step
             total += step
     rows[spot(FACTOR, l)], rows[spot(TAKEN, l)], rows[spot(FRESH, l)] = 1.0, 1.0, 0.0
+    rows[spot(FINAL, l)] = 1.0 if rows[spot(BEST, l)] <= NEAR * rows[spot(LENGTH, l)] else 0.0
     place_trial(rows, l)
     return np.isfinite(total)
 

@@ -15,7 +15,7 @@ from ..fabric.law import active_inputs
 from ..lanes import kernel, spot
 from .balance import FLOOR, MAX_VOID_RATIO, critical_void_ratio
 from .history import advance, assign, carried, clear, density, law_carried
-from .iteration import again, begin, correct, take_step
+from .iteration import again, begin, take_step
 from .points import finish, mean_force, old_pressure, open_point, report
 from .pool import CODE, EQUILIBRIUM, EVALUATIONS, ITERATE, SUBSTEPS
 from .rows import (
@@ -207,7 +207,6 @@ def settle(constants, components, rule, pool, strain, out, l):
         return False
     if pool.counts[CODE, l] != EQUILIBRIUM:
         return lost(constants, rule, pool, out, l)
-    correct(pool, components, constants.evolving, l)
     if rows[spot(RAISING, l)] == 1.0 and rows[spot(SHARE, l)] < 1.0:
         rows[spot(SHARE, l)] *= RAISE
         again(pool, l)
