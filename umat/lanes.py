@@ -19,12 +19,15 @@ COMPILED = not numba.config.DISABLE_JIT
 #: Points in flight in one kernel: as many numbers as one instruction handles at most.
 LANES = 8 if COMPILED else 64
 
-_OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "fastmath": {"contract"}}
+# no kernel makes arrays, and counting who holds one would empty the vector registers at every turn
+_OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "fastmath": {"contract"}, "_nrt": False}
 #: Decorator of what Python calls: kept on disk from one session to the next.
 entry = njit(cache=True, **_OPTIONS)
 #: Decorator of what only kernels call: no global lock, C arithmetic, multiply–add fused (the same on every run), and
 #: no wrappers for Python, which would take longer to compile than the functions.
 kernel = njit(no_cpython_wrapper=True, no_cfunc_wrapper=True, **_OPTIONS)
+#: Decorator of short kernels whose arguments are rows: they stay in registers only where there is no call.
+inlined = njit(no_cpython_wrapper=True, no_cfunc_wrapper=True, forceinline=True, **_OPTIONS)
 
 if COMPILED:
     from llvmlite import ir

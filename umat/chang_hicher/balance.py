@@ -14,7 +14,7 @@ dZ = dσ G⁻¹/c − (2/15) Z dF G⁻¹ − Z (c'/c) de   (total; with Z − Z_
 import numpy as np
 
 from ..fabric.law import dot, plus, scaled
-from ..lanes import kernel, nine, put, row, six, store
+from ..lanes import inlined, kernel, nine, put, row, six, store
 from .rows import (
     BY_FABRIC,
     BY_VOID,
@@ -60,19 +60,19 @@ FLOOR = 0.02  #: least void ratio, and critical void ratio, for which the law is
 MAX_VOID_RATIO = 1.64  #: the contact density ∝ 13.28 − 8 e stays positive
 
 
-@kernel
+@inlined
 def plain(a):
     """Return the plain components of a tensor in Mandel components."""
     return (a[0], a[1], a[2], HALF_SQRT2 * a[3], HALF_SQRT2 * a[4], HALF_SQRT2 * a[5])
 
 
-@kernel
+@inlined
 def matrix(a):
     """Return the nine entries of a symmetric matrix of six plain components."""
     return (a[0], a[5], a[4], a[5], a[1], a[3], a[4], a[3], a[2])
 
 
-@kernel
+@inlined
 def inverse_fabric(fabric):
     """Return the inverse of G = I/3 + 2F/15 (plain components)."""
     xx, yy, zz, yz, xz, xy = fabric
@@ -83,7 +83,7 @@ def inverse_fabric(fabric):
     return scaled(1.0 / np.maximum(a * ixx + f * ixy + e * ixz, 1e-30), (ixx, iyy, izz, iyz, ixz, ixy))
 
 
-@kernel
+@inlined
 def contact_density(void_ratio):
     """Return c(e) = 2 m_V r³ and its derivative [ZK Table 3]."""
     denominator = 1.0 / (1.0 + void_ratio)
@@ -91,7 +91,7 @@ def contact_density(void_ratio):
     return c, -DENSITY * 8.0 * denominator - c * denominator
 
 
-@kernel
+@inlined
 def critical_void_ratio(p, line):
     """Return e_c and its derivative by p (p over p_ref) [ZK Table 3]; line = (e_ref, λ_c, ξ)."""
     e_ref, slope, exponent = line
@@ -151,13 +151,13 @@ def friction(rows, line, tan_mu):
     put(rows, PSI_P, slope)
 
 
-@kernel
+@inlined
 def symmetric(rows, first):
     """Return six plain rows as the nine entries of a symmetric matrix."""
     return matrix(six(rows, first))
 
 
-@kernel
+@inlined
 def times(a, b):
     """Return the product of two 3 × 3 matrices."""
     return (
@@ -173,7 +173,7 @@ def times(a, b):
     )
 
 
-@kernel
+@inlined
 def mandel(a):
     """Return the Mandel components of the symmetric part of a matrix; also of its gradient by a symmetric tensor."""
     return (
@@ -221,7 +221,7 @@ def friction_columns(rows):
     store(rows, FIRST, mandel(times(nine(rows, D_LATE), g)))
 
 
-@kernel
+@inlined
 def mixed(a, x, b, y):
     """Return x a + y b of nine entries."""
     return (
@@ -261,7 +261,7 @@ def by_force(rows, slope, i, j, place, share, total, evolving):
         store(rows, slope + FABRIC, scaled(-2.0 / 15.0 * share, f))
 
 
-@kernel
+@inlined
 def transposed(a):
     """Return the transpose of nine entries."""
     return (a[0], a[3], a[6], a[1], a[4], a[7], a[2], a[5], a[8])
@@ -298,14 +298,14 @@ def pair_row(q, j):
     return INVERSE + (q if q == j else 6 - q - j)
 
 
-@kernel
+@inlined
 def outer(a, b):
     """Return the nine entries a_i b_j."""
     return (a[0] * b[0], a[0] * b[1], a[0] * b[2], a[1] * b[0], a[1] * b[1], a[1] * b[2],
             a[2] * b[0], a[2] * b[1], a[2] * b[2])  # fmt: skip
 
 
-@kernel
+@inlined
 def half_share(rows, t, g):
     """Return Σ_q T_{q,ab} g_q as ((xx, yy), (zz, yz), (xz, xy)); T in the order of `planes.TRIPLE`."""
     x, y, z = g

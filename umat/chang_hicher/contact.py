@@ -21,7 +21,7 @@ exact one for λ̂ = λ_req; λ̂ is the sliding that the last linear step fores
 
 import numpy as np
 
-from ..lanes import LANES, kernel, nine, put, row, select, six, store
+from ..lanes import LANES, inlined, kernel, nine, put, row, select, six, store
 from .rows import (
     BARE,
     BARE_SLIPPED,
@@ -55,7 +55,7 @@ VERGE = 0.01  #: relative distance from sliding below which the first look at a 
 GROUP = 4  #: directions whose contributions are added in one pass over the sums
 
 
-@kernel
+@inlined
 def force(rows, first, base, a, n, total):
     """Return the force on plane a, from the nine rows of Z and, in the rate form, from what it was at the start."""
     nx, ny, nz = n
@@ -66,7 +66,7 @@ def force(rows, first, base, a, n, total):
     return x, y, z
 
 
-@kernel
+@inlined
 def quadratic(a, n):
     """Return n·a·n of six plain components."""
     nx, ny, nz = n
@@ -80,27 +80,27 @@ def quadratic(a, n):
     )
 
 
-@kernel
-def estimate(rows, guess, a, room, required, done):
-    """Return the sliding that the last linear step foresaw, and remember this trial; `kept` is where the step began."""
+@inlined
+def estimate(rows, guess, a, per_factor, room, required, done):
+    """Return the sliding that the last linear step foresaw; remember for the next one where this step began.
+
+    A direction has 1/room (the room itself where that is not positive), the sliding required and that estimated, of the
+    accepted iterate in rows 0 to 2 and of the last trial in rows 3 to 5.
+    """
     taken = row(rows, TAKEN) > 0.5
-    k_room = select(taken, row(guess, 6 * a + 3), row(guess, 6 * a))
+    per_room = select(taken, row(guess, 6 * a + 3), row(guess, 6 * a))
     k_required = select(taken, row(guess, 6 * a + 4), row(guess, 6 * a + 1))
     k_slid = select(taken, row(guess, 6 * a + 5), row(guess, 6 * a + 2))
-    change = (required - k_required) * room + (k_required - k_slid) * (room - k_room)
-    slid = k_required + change / (row(rows, FACTOR) * k_room)
+    store(guess, 6 * a, (per_room, k_required, k_slid))
+    relative = room * per_room
+    change = (required - k_required) * relative + (k_required - k_slid) * (relative - 1.0)
+    slid = k_required + change * per_factor
     near = np.abs(slid - required) < 0.1 * required
     trusted = (k_required > done) & (slid > done) & (row(rows, FRESH) < 0.5)
-    slid = select(trusted, select(near, required, slid), required)
-    put(guess, 6 * a, k_room)
-    put(guess, 6 * a + 1, k_required)
-    put(guess, 6 * a + 2, k_slid)
-    put(guess, 6 * a + 4, required)
-    put(guess, 6 * a + 5, slid)
-    return slid
+    return select(trusted, select(near, required, slid), required)
 
 
-@kernel
+@inlined
 def loading(rows, n, t):
     """Return the normal component of the strain of a plane, and that along t."""
     nx, ny, nz = n
@@ -111,8 +111,8 @@ def loading(rows, n, t):
     return x * nx + y * ny + z * nz, x * t[0] + y * t[1] + z * t[2]
 
 
-@kernel
-def contact_plane(rows, slide, guess, base, buffer, out, rule, a, elastic, total):
+@inlined
+def contact_plane(rows, slide, guess, start, base, buffer, out, rule, a, elastic, total, per_factor, fresh):
     """Write one direction's displacement and its derivatives, times the direction's weight, from row `out` on.
 
     slide: sliding done before and after the step; guess: what `estimate` needs, `GUESS` rows a direction; elastic:
@@ -123,11 +123,13 @@ def contact_plane(rows, slide, guess, base, buffer, out, rule, a, elastic, total
     nx, ny, nz = n = (rule.normals[a, 0], rule.normals[a, 1], rule.normals[a, 2])
     # forces
     fx, fy, fz = force(rows, FORCE, base, a, n, total)
-    gx, gy, gz = force(rows, FORCE_OLD, base, a, n, total)
     fn = fx * nx + fy * ny + fz * nz
-    gn = np.maximum(gx * nx + gy * ny + gz * nz, 1e-30)
     tx, ty, tz = fx - fn * nx, fy - fn * ny, fz - fn * nz
-    hx, hy, hz = gx - gn * nx, gy - gn * ny, gz - gn * nz
+    if fresh:
+        gx, gy, gz = force(rows, FORCE_OLD, base, a, n, total)
+        gn = np.maximum(gx * nx + gy * ny + gz * nz, 1e-30)
+        store(start, 5 * a, (gn, np.sqrt(gn), gx - gn * nx, gy - gn * ny, gz - gn * nz))
+    gn, so, hx, hy, hz = row(start, 5 * a), row(start, 5 * a + 1), row(start, 5 * a + 2), row(start, 5 * a + 3), row(start, 5 * a + 4)
     ft = np.sqrt(tx * tx + ty * ty + tz * tz + TINY)
     ux, uy, uz = tx + hx, ty + hy, tz + hz
     um = np.sqrt(ux * ux + uy * uy + uz * uz + TINY)
@@ -140,7 +142,7 @@ def contact_plane(rows, slide, guess, base, buffer, out, rule, a, elastic, total
     room = np.maximum(space, 1e-12 * fn)
     w = weight * density
     # elastic
-    s, so = np.sqrt(fn), np.sqrt(gn)
+    s = np.sqrt(fn)
     middle = fn + gn
     inverse = 1.0 / (ft * um)
     i_ft, i_um = inverse * um, inverse * ft
@@ -157,16 +159,18 @@ def contact_plane(rows, slide, guess, base, buffer, out, rule, a, elastic, total
     done, share = row(slide, a), row(rows, SHARE)
     slip = share * np.maximum(required - done, 0.0)
     put(slide, count + a, done + slip)
-    slid = estimate(rows, guess, a, room, required, done)
-    put(guess, 6 * a + 3, space)
+    slid = estimate(rows, guess, a, per_factor, room, required, done)
+    store(guess, 6 * a + 3, (select(space > 0.0, i_room, space), required, slid))
     ax, ay, az = tx * i_ft, ty * i_ft, tz * i_ft
     along_n = (0.5 * push * i_fn - slid) * tan_p * i_room
     along_t = (stiff * tan_p + slid) * i_room
     # which contacts slide: at first those on the verge of it that a uniform strain would load
-    strain_n, strain_t = loading(rows, n, (ax, ay, az))
-    verge = VERGE * row(rows, FRESH) * (1.0 - row(rows, FINAL)) * done
-    trend = ease_t * along_n * strain_n + along_t * strain_t
-    on = select(required > done - select(trend > 0.0, verge, -verge), share, 0.0)
+    on = select(required > done, share, 0.0)
+    if fresh:
+        strain_n, strain_t = loading(rows, n, (ax, ay, az))
+        verge = VERGE * row(rows, FRESH) * (1.0 - row(rows, FINAL)) * done
+        trend = ease_t * along_n * strain_n + along_t * strain_t
+        on = select(required > done - select(trend > 0.0, verge, -verge), share, 0.0)
     along_n, along_t = on * along_n, on * along_t
     qx, qy, qz = along_n * nx + along_t * ax, along_n * ny + along_t * ay, along_n * nz + along_t * az
     # direction of sliding at the middle and at the end
@@ -231,16 +235,18 @@ def add_moments(rows, buffer, table, first, terms):
 
 
 @kernel
-def sum_planes(rows, slide, guess, base, buffer, rule, terms, elastic, total, evolving, full):
+def sum_planes(rows, slide, guess, start, base, buffer, rule, terms, elastic, total, evolving, full, fresh):
     """Sum displacement, its moments and derivatives over all contact planes, into the rows from `SUMS` on.
 
-    full: whether the sums that only error and tangent need are wanted.
+    full: whether the sums that only error and tangent need are wanted; fresh: whether some lane begins a sub-step.
     """
+    count, per_factor = rule.weights.shape[0], 1.0 / row(rows, FACTOR)
     for i in range(192):
         put(rows, SUMS + i, 0.0)
-    for first in range(0, rule.weights.shape[0], GROUP):
-        for k in range(GROUP):
-            contact_plane(rows, slide, guess, base, buffer, k * BUFFER, rule, first + k, elastic, total)
+    for first in range(0, count, GROUP):
+        # what is missing in the last group has no weight in the table; the buffer keeps older numbers there
+        for k in range(min(GROUP, rule.count - first)):
+            contact_plane(rows, slide, guess, start, base, buffer, k * BUFFER, rule, first + k, elastic, total, per_factor, fresh)
         add_moments(rows, buffer, rule.table, first, terms.always)
         if full:
             add_moments(rows, buffer, rule.table, first, terms.final)

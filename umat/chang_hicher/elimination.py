@@ -5,7 +5,7 @@ the material is stable. A vanishing pivot gives a step that is not finite, or wi
 step control see to those.
 """
 
-from ..lanes import kernel, put, row
+from ..lanes import inlined, kernel, put, row
 
 
 @kernel
@@ -34,7 +34,7 @@ def solve(rows, matrix, right, n, m):
             subtract(rows, row(rows, matrix + i * n + k), right + i * m, right + k * m, m)
 
 
-@kernel
+@inlined
 def subtract(rows, factor, target, source, m):
     """Subtract a factor times m rows from m rows."""
     for j in range(m):

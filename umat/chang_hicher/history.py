@@ -164,7 +164,7 @@ def plane_change(rows, done, elastic, n, l, small):
 @kernel
 def carried(rows, slide, base, rule, constants, change, dz, dslide, out, small, long, l):
     """Fill dε and dε^p (12, 6) through the start of the sub-step: `change` (13, 6), dz (9, 6), dslide (N, 6)."""
-    normals, weights, _ = rule
+    normals, weights = rule.normals, rule.weights
     elastic, line, tan_mu = constants.elastic, constants.line, constants.tan_mu
     total, evolving = constants.total, constants.evolving
     sums, dz_new, dilate = long[:18], long[18:27], long[27]
@@ -303,7 +303,7 @@ def law_carried(rows, change, strain_change, out, ratio, l):
 @kernel
 def advance(rows, slide, base, rule, constants, change, new, dz, dslide, small, l):
     """Move dZ and dλ to the end of the sub-step, whose state depends on the increment through `new` (13, 6)."""
-    normals, weights, _ = rule
+    normals, weights = rule.normals, rule.weights
     elastic, line, total = constants.elastic, constants.line, constants.total
     if total:
         clear(dz)

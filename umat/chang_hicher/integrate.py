@@ -26,6 +26,7 @@ from .rows import (
     ERRORS,
     FINAL,
     FRACTION,
+    FRESH,
     GAIN_END,
     GEO,
     H_SLIPPED,
@@ -50,13 +51,14 @@ from .rows import (
 from .substeps import settle, through_start
 
 @kernel
-def evaluate(law, constants, rule, terms, pool, full):
+def evaluate(law, constants, rule, terms, pool, full, fresh):
     """Evaluate residual and Jacobian at every lane's trial state; full: with all that tangent and error need."""
     rows, total, evolving = pool.rows, constants.total, constants.evolving
     geometry(rows, constants.line, constants.tan_mu, total)
     sum_planes(
-        rows, pool.slide, pool.guess, pool.base, pool.buffer, rule, terms, constants.elastic, total, evolving, full
-    )
+        rows, pool.slide, pool.guess, pool.start, pool.base, pool.buffer, rule, terms, constants.elastic,
+        total, evolving, full, fresh,
+    )  # fmt: skip
     add_elastic(rows)
     friction_columns(rows)
     strain_and_slope(rows, D, H, T, STRAIN, SLOPE, GEO, total, evolving, full)
@@ -136,14 +138,15 @@ def integrate(law, constants, rule, terms, pool, data, out, order):
     codes[:] = IDLE
     while True:
         following = fill(constants, rule, pool, data, out, order, following)
-        busy, waiting = 0, 0
+        busy, waiting, fresh = 0, 0, False
         for l in range(LANES):
             busy += codes[l] != IDLE
             waiting += codes[l] != IDLE and pool.rows[spot(FINAL, l)] == 1.0
+            fresh = fresh or (codes[l] != IDLE and pool.rows[spot(FRESH, l)] == 1.0)
         if busy == 0:
             return
         full = 2 * waiting >= busy
-        evaluate(law, constants, rule, terms, pool, full)
+        evaluate(law, constants, rule, terms, pool, full, fresh)
         solving, balanced = judge_lanes(constants, rule.weights.shape[0], pool, full)
         if solving == 0:
             continue

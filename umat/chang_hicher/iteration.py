@@ -100,7 +100,7 @@ def reach(pool, count, l):
     for a in range(count):
         kept, tried = pool.guess[spot(6 * a, l)], pool.guess[spot(6 * a + 3, l)]
         if not tried > 0.0:
-            part = min(part, (1.0 - KEPT_ROOM) * kept / (kept - tried))
+            part = min(part, (1.0 - KEPT_ROOM) / (1.0 - tried * kept))
     return part if 0.0 < part < 1.0 else 0.5
 
 

@@ -57,7 +57,8 @@ class Rule(NamedTuple):
 
     normals: NDArray[np.float64]
     weights: NDArray[np.float64]
-    table: NDArray[np.float64]
+    table: NDArray[np.float64]  #: zero where there is no weight
+    count: int  #: without the padding
 
 
 @lru_cache(maxsize=2)
@@ -110,4 +111,5 @@ def padded(directions: Directions) -> Rule:
     missing = -len(directions.weights) % GROUP
     normals = np.vstack([directions.normals, np.repeat(directions.normals[:1], missing, axis=0)])
     weights = np.concatenate([directions.weights, np.zeros(missing)])
-    return Rule(np.ascontiguousarray(normals), weights, moments(normals))
+    table = moments(normals) * (weights > 0.0)[:, None]
+    return Rule(np.ascontiguousarray(normals), weights, table, len(directions.weights))

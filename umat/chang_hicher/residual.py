@@ -7,7 +7,7 @@ law's ΔF reads F, σ and ψ at the middle of the step and the step's increments
 import numpy as np
 
 from ..fabric.law import active_inputs, dot, increments, scaled, slope_of
-from ..lanes import LANES, kernel, put, row, six, store
+from ..lanes import LANES, inlined, kernel, put, row, six, store
 from .rows import (
     BY_VOID_STRAIN,
     COLUMNS,
@@ -99,7 +99,7 @@ def fabric_rows(law, rows):
         by_plastic(rows, out, own + 25)
 
 
-@kernel
+@inlined
 def by_plastic(rows, out, law):
     """Subtract the product of a row of the law's derivative with the plastic strain's."""
     d = six(rows, law)
@@ -116,7 +116,7 @@ def by_plastic(rows, out, law):
         put(rows, out + c, row(rows, out + c) - change)
 
 
-@kernel
+@inlined
 def copy(rows, target, source):
     """Copy a row."""
     put(rows, target, row(rows, source))

@@ -21,7 +21,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba.extending import overload
 
-from ..lanes import COMPILED, at, entry, kernel, lanes
+from ..lanes import COMPILED, at, entry, inlined, kernel, lanes
 
 #: place of each argument among the inputs of a law, and their number
 SPAN = {
@@ -105,7 +105,7 @@ if COMPILED:
         return entry.slope.py_func
 
 
-@kernel
+@inlined
 def six_at(rows, first, l):
     """Return six rows as a tuple, of lane l (of all lanes with the compiler switched off)."""
     return (
@@ -176,38 +176,38 @@ def complex_slope(law, inputs, slope):
 # --- tensors as 6-tuples, also complex -------------------------------------------------------------------------
 
 
-@kernel
+@inlined
 def dot(a, b):
     """Return a : b."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3] + a[4] * b[4] + a[5] * b[5]
 
 
-@kernel
+@inlined
 def scaled(k, a):
     """Return k a."""
     return (k * a[0], k * a[1], k * a[2], k * a[3], k * a[4], k * a[5])
 
 
-@kernel
+@inlined
 def plus(a, b):
     """Return a + b."""
     return (a[0] + b[0], a[1] + b[1], a[2] + b[2], a[3] + b[3], a[4] + b[4], a[5] + b[5])
 
 
-@kernel
+@inlined
 def deviator(a):
     """Return a - tr(a)/3 I."""
     m = (a[0] + a[1] + a[2]) / 3.0
     return (a[0] - m, a[1] - m, a[2] - m, a[3], a[4], a[5])
 
 
-@kernel
+@inlined
 def length(a):
     """Return √(a : a)."""
     return np.sqrt(dot(a, a) + TINY)
 
 
-@kernel
+@inlined
 def determinant(a):
     """Return det a of a tensor in Mandel components."""
     return a[0] * a[1] * a[2] + 0.5 * (
@@ -215,14 +215,14 @@ def determinant(a):
     )
 
 
-@kernel
+@inlined
 def cos3theta(a):
     """Return cos 3θ of a deviator, θ = 0 in compression; it fades to 0 where a is shorter than `SMALL`."""
     n2 = dot(a, a) + SMALL * SMALL
     return 3.0 * 6.0**0.5 * determinant(a) / (n2 * np.sqrt(n2))
 
 
-@kernel
+@inlined
 def stress_ratio(stress):
     """Return the tensor s/p and q/p."""
     p = (stress[0] + stress[1] + stress[2]) / 3.0

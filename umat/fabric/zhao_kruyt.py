@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from ..lanes import kernel, put, row, six, store
+from ..lanes import inlined, kernel, put, row, six, store
 from .law import SMALL, TINY, cos3theta, determinant, deviator, dot, law, plus, scaled, stress_ratio
 
 SQRT6 = 6.0**0.5
@@ -79,7 +79,7 @@ def _slope(law, inputs, slope):
     _slope_row(slope, 5, u[5], n[5], parts)
 
 
-@kernel
+@inlined
 def _slope_row(slope, i, u, n, parts):
     """Write the derivative of one component of ΔF, that of the plastic deviator being u."""
     by_fabric, by_stress, by_psi, along, straight = parts
@@ -92,7 +92,7 @@ def _slope_row(slope, i, u, n, parts):
         put(slope, 31 * i + 25 + k, row(slope, 31 * i + 25 + k) + own * straight)
 
 
-@njit
+@inlined
 def cofactor(a):
     """Return the deviator of the gradient of det a, Mandel components, a a deviator."""
     return deviator((
