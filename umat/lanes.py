@@ -15,6 +15,8 @@ import numba
 import numpy as np
 from numba import njit
 
+from .compiling import InnerCompiler
+
 COMPILED = not numba.config.DISABLE_JIT
 #: Points in flight in one kernel: as many numbers as one instruction handles at most.
 LANES = 8 if COMPILED else 64
@@ -25,9 +27,10 @@ _OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "fastmath": {
 entry = njit(cache=True, **_OPTIONS)
 #: Decorator of what only kernels call: no global lock, C arithmetic, multiply–add fused (the same on every run), and
 #: no wrappers for Python, which would take longer to compile than the functions.
-kernel = njit(no_cpython_wrapper=True, no_cfunc_wrapper=True, **_OPTIONS)
+_INNER: dict[str, Any] = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True, "pipeline_class": InnerCompiler, **_OPTIONS}
+kernel = njit(**_INNER)
 #: Decorator of short kernels whose arguments are rows: they stay in registers only where there is no call.
-inlined = njit(no_cpython_wrapper=True, no_cfunc_wrapper=True, forceinline=True, **_OPTIONS)
+inlined = njit(forceinline=True, **_INNER)
 
 if COMPILED:
     from llvmlite import ir
