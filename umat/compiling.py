@@ -56,8 +56,6 @@ class InnerCompiler(CompilerBase):
     def define_pipelines(self) -> list[Any]:
         """Return the usual passes but one."""
         passes = DefaultPassBuilder.define_nopython_pipeline(self.state)
-        passes.passes = [
-            (InnerLowering, why) if step is NativeLowering else (step, why) for step, why in passes.passes
-        ]
+        passes.passes = [(InnerLowering, why) if step is NativeLowering else (step, why) for step, why in passes.passes]
         passes.finalize()
         return [passes]

@@ -21,7 +21,7 @@ exact one for λ̂ = λ_req; λ̂ is the sliding that the last linear step fores
 
 import numpy as np
 
-from ..lanes import LANES, inlined, kernel, nine, put, row, select, six, store
+from ..lanes import inlined, kernel, nine, put, row, select, six, store
 from .rows import (
     BARE,
     BARE_SLIPPED,
@@ -129,7 +129,13 @@ def contact_plane(rows, slide, guess, start, base, buffer, out, rule, a, elastic
         gx, gy, gz = force(rows, FORCE_OLD, base, a, n, total)
         gn = np.maximum(gx * nx + gy * ny + gz * nz, 1e-30)
         store(start, 5 * a, (gn, np.sqrt(gn), gx - gn * nx, gy - gn * ny, gz - gn * nz))
-    gn, so, hx, hy, hz = row(start, 5 * a), row(start, 5 * a + 1), row(start, 5 * a + 2), row(start, 5 * a + 3), row(start, 5 * a + 4)
+    gn, so, hx, hy, hz = (
+        row(start, 5 * a),
+        row(start, 5 * a + 1),
+        row(start, 5 * a + 2),
+        row(start, 5 * a + 3),
+        row(start, 5 * a + 4),
+    )
     ft = np.sqrt(tx * tx + ty * ty + tz * tz + TINY)
     ux, uy, uz = tx + hx, ty + hy, tz + hz
     um = np.sqrt(ux * ux + uy * uy + uz * uz + TINY)
@@ -245,8 +251,10 @@ def sum_planes(rows, slide, guess, start, base, buffer, rule, terms, elastic, to
         put(rows, SUMS + i, 0.0)
     for first in range(0, count, GROUP):
         # what is missing in the last group has no weight in the table; the buffer keeps older numbers there
-        for k in range(min(GROUP, rule.count - first)):
-            contact_plane(rows, slide, guess, start, base, buffer, k * BUFFER, rule, first + k, elastic, total, per_factor, fresh)
+        for k in range(min(GROUP, rule.used - first)):
+            contact_plane(
+                rows, slide, guess, start, base, buffer, k * BUFFER, rule, first + k, elastic, total, per_factor, fresh
+            )
         add_moments(rows, buffer, rule.table, first, terms.always)
         if full:
             add_moments(rows, buffer, rule.table, first, terms.final)

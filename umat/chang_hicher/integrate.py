@@ -1,8 +1,8 @@
 """Integration of many points over their strain increments: a pool of lanes, each at its own place in its own point.
 
-A round evaluates residual and Jacobian at the trial state of every lane at once. What only the tangent, the error and the
-last digits of Newton's step need is evaluated once: a lane that expects its next trial to be the last waits until half of
-the lanes do. Then each lane decides by itself:
+A round evaluates residual and Jacobian at the trial state of every lane at once. What only the tangent, the error and
+the last digits of Newton's step need is evaluated once: a lane that expects its next trial to be the last waits until
+half of the lanes do. Then each lane decides by itself:
 
 * `iteration`: inside the domain, take the next Newton step; outside, come back;
 * `substeps`: in equilibrium, compare with backward Euler (embedded, first order), accept the sub-step or cut it;
@@ -49,6 +49,7 @@ from .rows import (
     T,
 )  # fmt: skip
 from .substeps import settle, through_start
+
 
 @kernel
 def evaluate(law, constants, rule, terms, pool, full, fresh):

@@ -58,7 +58,7 @@ class Rule(NamedTuple):
     normals: NDArray[np.float64]
     weights: NDArray[np.float64]
     table: NDArray[np.float64]  #: zero where there is no weight
-    count: int  #: without the padding
+    used: int  #: without the padding
 
 
 @lru_cache(maxsize=2)

@@ -128,4 +128,4 @@ H = _STARTS["H"]
 AXES = range(3)
 PAIR = [(0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1)]
 TRIPLE = [(i, j, k) for i in AXES for j in AXES for k in AXES if i <= j <= k]
-TRIPLES = np.array([[TRIPLE.index(tuple(sorted((k, *pair)))) for pair in PAIR] for k in AXES])
+TRIPLES = np.array([[[sorted(t) for t in TRIPLE].index(sorted((k, *pair))) for pair in PAIR] for k in AXES])

@@ -8,7 +8,6 @@ The exponential multiplies F:n only; otherwise there would be no peak.
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from ..lanes import inlined, kernel, put, row, six, store
 from .law import SMALL, TINY, cos3theta, determinant, deviator, dot, law, plus, scaled, stress_ratio
@@ -68,7 +67,6 @@ def _slope(law, inputs, slope):
     kx = -law.h * along * x
     by_fabric = plus(scaled(kf, df), plus(scaled(kf2, f), scaled(-x, n)))
     trend = (trend[0] - pull, trend[1] - pull, trend[2] - pull, trend[3], trend[4], trend[5])
-    aside = plus(f, scaled(-along, n))
     kb = scaled(-law.h * x, plus(f, scaled(-along, n)))
     parts = (scaled(law.h, by_fabric), scaled(kx * law.m, trend), kx, kb, b)
     _slope_row(slope, 0, u[0], n[0], parts)
