@@ -13,7 +13,7 @@ ROOT = Path(__file__).parents[1]
 ORDER = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
 FOLDERS = {"cases", "docs", "fabfem", "meshes", "tests", "umat"}
 PACKAGES = ["umat", "fabfem", "fabfem/fem", "fabfem/boundary_value"]
-OUTSIDE = {"umat": {"numba", "numpy", "scipy"}}
+OUTSIDE = {"umat": {"llvmlite", "numba", "numpy", "scipy"}}
 """Packages that a layer may import besides the standard library."""
 
 
