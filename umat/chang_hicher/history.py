@@ -10,7 +10,7 @@ points that needed more than one sub-step pass here.
 import numpy as np
 
 from ..fabric.law import scaled
-from ..lanes import kernel, spot
+from ..lanes import inlined, kernel, spot
 from .balance import HALF_SQRT2, contact_density, critical_void_ratio, inverse_fabric, matrix, plain, times
 from .contact import TINY
 from .rows import (
@@ -37,7 +37,7 @@ from .rows import (
 )  # fmt: skip
 
 
-@kernel
+@inlined
 def clear(a):
     """Set a matrix to zero."""
     for i in range(a.shape[0]):
@@ -45,7 +45,7 @@ def clear(a):
             a[i, j] = 0.0
 
 
-@kernel
+@inlined
 def assign(a, b):
     """Copy a matrix."""
     for i in range(a.shape[0]):
@@ -206,7 +206,7 @@ def carried(rows, slide, base, rule, constants, change, dz, dslide, out, small, 
                 out[i, c] += rows[spot(place, l)] * change[6 + k, c]
 
 
-@kernel
+@inlined
 def six_of(rows, first, l):
     """Return six numbers of lane l."""
     return (
@@ -219,7 +219,7 @@ def six_of(rows, first, l):
     )
 
 
-@kernel
+@inlined
 def start_force(rows, total, l):
     """Fill Z at the start of an increment: σ G⁻¹ / c(e), or nothing where forces are kept direction by direction."""
     for i in range(9):
@@ -234,7 +234,7 @@ def start_force(rows, total, l):
         rows[spot(FORCE_OLD + i, l)] = entries[i]
 
 
-@kernel
+@inlined
 def density(rows, n, l):
     """Return 1 + F_m : n n."""
     cross = (

@@ -13,7 +13,7 @@ half of the lanes do. Then each lane decides by itself:
 import numpy as np
 
 from ..fabric.law import active_inputs, increments
-from ..lanes import LANES, entry, kernel, spot
+from ..lanes import LANES, entry, inlined, spot
 from .balance import add_elastic, friction_columns, geometry, strain_and_slope
 from .contact import end_of_step, sum_planes
 from .elimination import factorise, solve
@@ -51,7 +51,7 @@ from .rows import (
 from .substeps import settle, through_start
 
 
-@kernel
+@inlined
 def evaluate(law, constants, rule, terms, pool, full, fresh):
     """Evaluate residual and Jacobian at every lane's trial state; full: with all that tangent and error need."""
     rows, total, evolving = pool.rows, constants.total, constants.evolving
@@ -73,7 +73,7 @@ def evaluate(law, constants, rule, terms, pool, full, fresh):
     norms(rows, terms.components, evolving)
 
 
-@kernel
+@inlined
 def fill(constants, rule, pool, data, out, order, following):
     """Give every idle lane the next point that can be tried; return the place in the order after them."""
     for l in range(LANES):
@@ -84,7 +84,7 @@ def fill(constants, rule, pool, data, out, order, following):
     return following
 
 
-@kernel
+@inlined
 def solve_lanes(law, constants, rule, components, pool, balanced):
     """Solve every lane's system for the Newton step, and where some lane is in equilibrium for tangent and error."""
     rows, evolving = pool.rows, constants.evolving
@@ -113,7 +113,7 @@ def solve_lanes(law, constants, rule, components, pool, balanced):
     end_of_step(rows, pool.slide, pool.base, rule, constants.elastic, constants.total)
 
 
-@kernel
+@inlined
 def judge_lanes(constants, count, pool, full):
     """Find what each lane does next; return how many need their system solved, and how many are in equilibrium.
 

@@ -9,7 +9,7 @@ fifth of its room. There is no other line search.
 
 import numpy as np
 
-from ..lanes import kernel, spot
+from ..lanes import inlined, kernel, spot
 from .pool import CUT, EQUILIBRIUM, EVALUATIONS, ITERATE, ITERATIONS, TRIAL, TRIES
 from .rows import (
     ACCEPTED,
@@ -47,7 +47,7 @@ PULL, FURTHER = 0.005, 8.0  #: first pull toward the centre of the domain, and h
 KEPT_ROOM = 0.2  #: of the room to the friction limit that a step out of the domain may leave
 
 
-@kernel
+@inlined
 def begin(pool, l):
     """Set the trial state of a new sub-step: the old stress and fabric, the void ratio of its end."""
     rows = pool.rows
@@ -63,7 +63,7 @@ def begin(pool, l):
     again(pool, l)
 
 
-@kernel
+@inlined
 def again(pool, l):
     """Begin to iterate from the trial state."""
     rows = pool.rows
@@ -82,7 +82,7 @@ def toward_centre(rows, l, keep):
         rows[spot(Y + i, l)] = centre + keep * (rows[spot(OLD + i, l)] - centre)
 
 
-@kernel
+@inlined
 def place_trial(rows, l):
     """Set the trial state to a part of the last Newton step."""
     for i in range(12):
@@ -113,7 +113,7 @@ def shorten(pool, count, l):
     place_trial(pool.rows, l)
 
 
-@kernel
+@inlined
 def converged(norm, previous, length):
     """Return whether the last correction and the tangent are good enough at a residual.
 
@@ -124,14 +124,14 @@ def converged(norm, previous, length):
     return falling or norm <= NEWTON_TOLERANCE * length + NEWTON_FLOOR
 
 
-@kernel
+@inlined
 def once_more(rows, l):
     """Ask for a full evaluation of the same state; estimates of the sliding stay what they were."""
     rows[spot(FINAL, l)], rows[spot(TAKEN, l)] = 1.0, 0.0
     return TRIAL
 
 
-@kernel
+@inlined
 def judge(constants, count, pool, l):
     """Return what a lane does with the state just evaluated; count: contact directions."""
     rows, counts = pool.rows, pool.counts
@@ -163,7 +163,7 @@ def judge(constants, count, pool, l):
     return ITERATE
 
 
-@kernel
+@inlined
 def take_step(pool, components, evolving, l):
     """Set the trial state to the Newton step just solved; False if it is not finite."""
     rows, nc = pool.rows, components.shape[0]
@@ -182,7 +182,7 @@ def take_step(pool, components, evolving, l):
     return np.isfinite(total)
 
 
-@kernel
+@inlined
 def correct(pool, components, evolving, l):
     """Add the last Newton step, which the residual of an equilibrium is still good for, to stress and fabric."""
     rows, nc = pool.rows, components.shape[0]

@@ -12,7 +12,7 @@ import numpy as np
 
 from .. import status
 from ..fabric.law import active_inputs
-from ..lanes import kernel, spot
+from ..lanes import inlined, kernel, spot
 from .balance import FLOOR, MAX_VOID_RATIO, critical_void_ratio
 from .history import advance, assign, carried, clear, density, law_carried
 from .iteration import again, begin, take_step
@@ -64,14 +64,14 @@ def through_start(law, constants, rule, components, pool, l):
                 rows[spot(TANGENT + 6 * (nc + row) + c, l)] -= pool.carried_fabric[components[row], c]
 
 
-@kernel
+@inlined
 def local_error(rows, l):
     """Return the estimated error of the sub-step: of the stress relative to its norm, or of the fabric."""
     stress = np.sqrt(rows[spot(STRESS_NORM, l)]) + STRESS_FLOOR
     return max(np.sqrt(rows[spot(STRESS_ERROR, l)]) / stress, np.sqrt(rows[spot(FABRIC_ERROR, l)]))
 
 
-@kernel
+@inlined
 def collect(pool, components, evolving, l):
     """Fill the derivative (13, 6) of the sub-step's end by the strain increment from the solved columns."""
     nc = components.shape[0]
@@ -199,7 +199,7 @@ def opening(constants, rule, pool, out, p, l):
     return True
 
 
-@kernel
+@inlined
 def settle(constants, components, rule, pool, strain, out, l):
     """Act on a lane's solved system; return True when its point is finished, one way or the other."""
     rows = pool.rows
