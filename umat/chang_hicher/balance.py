@@ -99,7 +99,7 @@ def critical_void_ratio(p, line):
     return e_ref - power, -exponent * power / np.maximum(p, 1e-12)
 
 
-@inlined
+@kernel
 def geometry(rows, line, tan_mu, total):
     """Fill what the contact planes read and the geometry rows, from the trial state and the old one."""
     stress, fabric = plain(six(rows, Y)), plain(six(rows, Y + FABRIC))
@@ -127,7 +127,7 @@ def geometry(rows, line, tan_mu, total):
     friction(rows, line, tan_mu)
 
 
-@inlined
+@kernel
 def friction(rows, line, tan_mu):
     """Fill tanφ_p (end), tanφ_d and ψ (middle) and their derivatives; start the margin with the law's own range."""
     p = (row(rows, Y) + row(rows, Y + 1) + row(rows, Y + 2)) / 3.0
@@ -182,7 +182,7 @@ def mandel(a):
     )  # fmt: skip
 
 
-@inlined
+@kernel
 def add_elastic(rows):
     """Fill H = H of the sliding + Σ W C_t δ_ik n_j n_l + Σ W E_i n_k n_j n_l, see `contact`."""
     for i in range(3):
@@ -203,7 +203,7 @@ def transform(rows, stiffness):
         store(rows, C + 9 * ik, times(times(inverse, symmetric(rows, stiffness + 6 * ik)), source))
 
 
-@inlined
+@kernel
 def project(rows, displacement, strain):
     """Fill the strain sym(D G_m⁻¹), Mandel, and the matrix itself."""
     product = times(nine(rows, displacement), symmetric(rows, INVERSE))
@@ -211,7 +211,7 @@ def project(rows, displacement, strain):
     store(rows, strain, mandel(product))
 
 
-@inlined
+@kernel
 def friction_columns(rows):
     """Fill the derivatives of the strain by p and by e through the friction angles, and the first-order part."""
     a, b = nine(rows, D_FRICTION), symmetric(rows, D_DILATANCY)

@@ -21,7 +21,7 @@ exact one for λ̂ = λ_req; λ̂ is the sliding that the last linear step fores
 
 import numpy as np
 
-from ..lanes import inlined, nine, put, row, select, six, store
+from ..lanes import inlined, kernel, nine, put, row, select, six, store
 from .rows import (
     BARE,
     BARE_SLIPPED,
@@ -221,7 +221,7 @@ def contact_plane(rows, slide, guess, start, base, buffer, out, rule, a, elastic
     store(buffer, out + BARE_SLIPPED, (weight * px, weight * py, weight * pz))
 
 
-@inlined
+@kernel
 def add_moments(rows, buffer, table, first, terms):
     """Add the buffered rows of `GROUP` directions, times their moments of n, to the sums, three sums at a time.
 
@@ -240,7 +240,7 @@ def add_moments(rows, buffer, table, first, terms):
         put(rows, at_c, c)
 
 
-@inlined
+@kernel
 def sum_planes(rows, slide, guess, start, base, buffer, rule, terms, elastic, total, evolving, full, fresh):
     """Sum displacement, its moments and derivatives over all contact planes, into the rows from `SUMS` on.
 
@@ -262,7 +262,7 @@ def sum_planes(rows, slide, guess, start, base, buffer, rule, terms, elastic, to
                 add_moments(rows, buffer, rule.table, first, terms.density)
 
 
-@inlined
+@kernel
 def end_of_step(rows, slide, base, rule, elastic, total):
     """Write the sliding done at the end of a step whose forces have been corrected."""
     compliance, _, ease_p = elastic

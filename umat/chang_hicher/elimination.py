@@ -8,7 +8,7 @@ step control see to those.
 from ..lanes import inlined, kernel, put, row
 
 
-@inlined
+@kernel
 def factorise(rows, matrix, n):
     """Replace n × n rows by their L U factors, the diagonal by its inverse."""
     for k in range(n):

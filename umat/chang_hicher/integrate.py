@@ -13,7 +13,7 @@ half of the lanes do. Then each lane decides by itself:
 import numpy as np
 
 from ..fabric.law import active_inputs, increments
-from ..lanes import LANES, entry, inlined, spot
+from ..lanes import LANES, entry, inlined, kernel, spot
 from .balance import add_elastic, friction_columns, geometry, strain_and_slope
 from .contact import end_of_step, sum_planes
 from .elimination import factorise, solve
@@ -51,7 +51,7 @@ from .rows import (
 from .substeps import settle, through_start
 
 
-@inlined
+@kernel
 def evaluate(law, constants, rule, terms, pool, full, fresh):
     """Evaluate residual and Jacobian at every lane's trial state; full: with all that tangent and error need."""
     rows, total, evolving = pool.rows, constants.total, constants.evolving
@@ -84,7 +84,7 @@ def fill(constants, rule, pool, data, out, order, following):
     return following
 
 
-@inlined
+@kernel
 def solve_lanes(law, constants, rule, components, pool, balanced):
     """Solve every lane's system for the Newton step, and where some lane is in equilibrium for tangent and error."""
     rows, evolving = pool.rows, constants.evolving

@@ -38,7 +38,7 @@ from .rows import (
 NEWTON_TOLERANCE = 1e-8  #: of the residual strain before the last correction, relative to the sub-step
 SMALL, QUADRATIC = 1e-5, 3e-4  #: the same if it fell by this factor in the last step: see `converged`
 NEWTON_FLOOR = 2e-15  #: of the residual strain, absolute: the rounding of the sums
-NEAR = 0.1  #: residual relative to the sub-step from which the next one is expected to be the last
+NEAR = 0.2  #: residual relative to the sub-step from which the next one is expected to be the last
 STALLED = 1e-6  #: residual relative to the sub-step that is taken when it falls no more
 MAX_ITERATIONS = 14
 MAX_TRIES = 10  #: at one Newton step
@@ -47,10 +47,9 @@ PULL, FURTHER = 0.005, 8.0  #: first pull toward the centre of the domain, and h
 KEPT_ROOM = 0.2  #: of the room to the friction limit that a step out of the domain may leave
 
 
-@inlined
-def begin(pool, l):
+@kernel
+def begin(rows, counts, l):
     """Set the trial state of a new sub-step: the old stress and fabric, the void ratio of its end."""
-    rows = pool.rows
     portion, fraction = rows[spot(PORTION, l)], rows[spot(FRACTION, l)]
     volume = rows[spot(FULL, l)] + rows[spot(FULL + 1, l)] + rows[spot(FULL + 2, l)]
     for i in range(6):
@@ -60,17 +59,16 @@ def begin(pool, l):
     specific = (1.0 + rows[spot(VOID_START, l)]) * np.exp(-(fraction + portion) * volume)
     rows[spot(Y + VOID, l)] = specific - 1.0
     rows[spot(BY_VOID_STRAIN, l)] = -specific * (fraction + portion)
-    again(pool, l)
+    again(rows, counts, l)
 
 
 @inlined
-def again(pool, l):
+def again(rows, counts, l):
     """Begin to iterate from the trial state."""
-    rows = pool.rows
     rows[spot(FACTOR, l)], rows[spot(FRESH, l)], rows[spot(TAKEN, l)] = 1.0, 1.0, 1.0
     rows[spot(BEST, l)], rows[spot(FINAL, l)] = np.inf, 0.0
-    pool.counts[ITERATIONS, l] = 0
-    pool.counts[TRIES, l] = 0
+    counts[ITERATIONS, l] = 0
+    counts[TRIES, l] = 0
 
 
 @kernel

@@ -101,7 +101,7 @@ def load(constants, rule, pool, data, out, point, l):
         out[2][point], out[5][point] = end, gap[point] - volume
         elastic_open(constants, rows, out[6], point, l)
         return report(pool, out, status.OK, l)
-    begin(pool, l)
+    begin(pool.rows, pool.counts, l)
     return True
 
 

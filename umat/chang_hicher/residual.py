@@ -47,7 +47,7 @@ from .rows import (
 FABRIC_WEIGHT = 0.1  #: of the fabric residual beside the strain residual
 
 
-@inlined
+@kernel
 def law_inputs(rows, weight):
     """Fill what a fabric law reads, at old + weight (new − old): weight ½ the middle, 1 the end of the step."""
     for i in range(6):
@@ -77,7 +77,7 @@ def by_ratio(rows, state, out):
         store(rows, out + 6 * i, scaled(i_p, straight))
 
 
-@inlined
+@kernel
 def fabric_rows(law, rows):
     """Fill the law's increment and the total derivative of F − F_o − ΔF by (σ, F, e), 6 × 13 rows."""
     inputs, slope = rows[INPUTS * LANES : (INPUTS + LAW_INPUTS) * LANES], rows[LAW_SLOPE * LANES :]
@@ -122,7 +122,7 @@ def copy(rows, target, source):
     put(rows, target, row(rows, source))
 
 
-@inlined
+@kernel
 def gather(rows, components, evolving):
     """Fill the square system of the components that do not vanish, and minus its residual."""
     nc = components.shape[0]
@@ -142,7 +142,7 @@ def gather(rows, components, evolving):
             put(rows, NEWTON + nc + i, row(rows, GAIN + a) - gain)
 
 
-@inlined
+@kernel
 def norms(rows, components, evolving):
     """Fill the norm of the residual as a strain, and of the sub-step's strain."""
     nc = components.shape[0]
@@ -157,7 +157,7 @@ def norms(rows, components, evolving):
     put(rows, LENGTH, np.sqrt(dot(part, part)))
 
 
-@inlined
+@kernel
 def right_hand_sides(rows, components, evolving):
     """Fill the tangent's columns (as if nothing depended on the start) and the error's column."""
     nc = components.shape[0]
@@ -183,7 +183,7 @@ def right_hand_sides(rows, components, evolving):
         put(rows, ERRORS + place, error)
 
 
-@inlined
+@kernel
 def error_norms(rows, components, evolving):
     """Fill the norms of the stress, of its error and of the fabric's error (squared)."""
     nc = components.shape[0]

@@ -115,7 +115,7 @@ def next_substep(constants, rule, pool, error, l):
     aligned = np.floor(fraction / (2.0 * portion)) * 2.0 * portion == fraction
     if error < 0.2 * constants.tolerance and aligned and fraction + 2.0 * portion <= 1.0:
         rows[spot(PORTION, l)] = 2.0 * portion
-    begin(pool, l)
+    begin(pool.rows, pool.counts, l)
     for i in range(12):
         rows[spot(Y + i, l)] += rows[spot(PORTION, l)] / portion * rows[spot(STEP + i, l)]
 
@@ -148,7 +148,7 @@ def lost(constants, rule, pool, out, l):
     if rows[spot(RAISING, l)] == 0.0:
         rows[spot(RAISING, l)], rows[spot(SHARE, l)] = 1.0, FIRST_SHARE
         if pool.counts[EVALUATIONS, l] < constants.max_evaluations:
-            begin(pool, l)
+            begin(pool.rows, pool.counts, l)
             return False
     share = 1.0 if rows[spot(RAISING, l)] == 1.0 else rows[spot(SHARE, l)]
     if rows[spot(PORTION, l)] > RELAXABLE or 0.25 * share < constants.least_share:
@@ -173,7 +173,7 @@ def go_on(constants, rule, pool, out, l):
     """Begin the sub-step again; out of means open the point or refuse it, and return True."""
     rows = pool.rows
     if rows[spot(PORTION, l)] >= SMALLEST and pool.counts[EVALUATIONS, l] < constants.max_evaluations:
-        begin(pool, l)
+        begin(pool.rows, pool.counts, l)
         return False
     p = min(old_pressure(rows, l), mean_force(constants, rule, pool, l))
     if p < NEARLY_OPEN * constants.open_pressure:
@@ -209,7 +209,7 @@ def settle(constants, components, rule, pool, strain, out, l):
         return lost(constants, rule, pool, out, l)
     if rows[spot(RAISING, l)] == 1.0 and rows[spot(SHARE, l)] < 1.0:
         rows[spot(SHARE, l)] *= RAISE
-        again(pool, l)
+        again(pool.rows, pool.counts, l)
         return False
     p = (rows[spot(Y, l)] + rows[spot(Y + 1, l)] + rows[spot(Y + 2, l)]) / 3.0
     if p < constants.open_pressure:
