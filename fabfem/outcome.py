@@ -38,6 +38,8 @@ class Description(NamedTuple):
     """Sentences on what it leaves out."""
     remains: tuple[tuple[str, str], ...]
     """Name and size of what is left."""
+    memory: float = 0.0
+    """Memory that a run needs [MiB]; 0 where the scene cannot tell."""
 
 
 def make_folder(folder: Path) -> None:

@@ -6,12 +6,17 @@ from typing import Any
 
 from fabfem.case import Case, read_case
 from fabfem.outcome import Description, Outcome
+from fabfem.restart import FRESH, Restart
 
-SCENES = {"boundary_value": "fabfem.boundary_value.run"}
-"""Module that runs each kind of scene; it has `describe(case)` and `run(case, folder, quiet)`."""
+SCENES = {
+    "boundary_value": "fabfem.boundary_value.run",
+    "element": "fabfem.laboratory.run",
+    "fabric": "fabfem.fabric_tests.run",
+}
+"""Module that runs each kind of scene; it has `describe(case)` and `run(case, folder, quiet, timer, restart)`."""
 
 
-def run_case(source: Case | Path, folder: Path, quiet: bool = False) -> Outcome:
+def run_case(source: Case | Path, folder: Path, quiet: bool = False, restart: Restart = FRESH) -> Outcome:
     """Run a case and write its results into a folder.
 
     Parameters
@@ -22,6 +27,8 @@ def run_case(source: Case | Path, folder: Path, quiet: bool = False) -> Outcome:
         Folder of the results, made if it is not there; results of an earlier run in it are replaced.
     quiet : bool
         Show no progress.
+    restart : Restart
+        Whether to go on from a checkpoint.
 
     Raises
     ------
@@ -29,7 +36,7 @@ def run_case(source: Case | Path, folder: Path, quiet: bool = False) -> Outcome:
         If the case cannot be run or the folder cannot be written.
     """
     case = source if isinstance(source, Case) else read_case(source)
-    return _scene(case).run(case, folder, quiet)
+    return _scene(case).run(case, folder, quiet, restart=restart)
 
 
 def describe_case(case: Case) -> Description:
@@ -41,6 +48,30 @@ def describe_case(case: Case) -> Description:
         If the case cannot be run.
     """
     return _scene(case).describe(case)
+
+
+def price_case(case: Case) -> str:
+    """Return what a run of a case will cost in time, in words; nothing where its kind of scene cannot tell.
+
+    Raises
+    ------
+    CaseError
+        If the case cannot be run.
+    """
+    scene = _scene(case)
+    return scene.price(case) if hasattr(scene, "price") else ""
+
+
+def remember_cost(case: Case, folder: Path) -> None:
+    """Keep what the completed run in a folder has cost, for the price of the next one of its kind."""
+    scene = _scene(case)
+    if hasattr(scene, "remember"):
+        scene.remember(case, folder)
+
+
+def replay_case(case: Case, start: Any) -> tuple[tuple[str, float, str] | None, list[str]]:
+    """Return how a case fails after a start (stage, fraction, reason), None if it goes on, and what was tried."""
+    return _scene(case).replay(case, start)
 
 
 def _scene(case: Case) -> Any:

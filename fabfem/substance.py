@@ -8,6 +8,7 @@ bedding planes dip by θ that way.
 import re
 from collections.abc import Mapping
 from functools import singledispatch
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -51,6 +52,8 @@ class Surroundings(NamedTuple):
     """Axis that points up."""
     flat: bool
     """Whether the plane of the mesh is a plane of mirror symmetry."""
+    folder: Path = Path()
+    """Folder of the case file."""
 
 
 @singledispatch
@@ -88,6 +91,20 @@ def _(table: said.MohrCoulomb, scene: Surroundings) -> Substance:
 @substance.register
 def _(table: said.DruckerPrager, scene: Surroundings) -> Substance:
     return Substance(umat.DruckerPrager(**_own(table)), None, {})
+
+
+@substance.register
+def _(table: said.Umat, around: Surroundings) -> Substance:
+    if table.components == 4 and not around.flat:
+        raise MisfitError("components", "a routine of four components serves plane strain and axisymmetry only")
+    if len(table.initial_state) > table.state_variables:
+        given = len(table.initial_state)
+        raise MisfitError("initial_state", f"has {given} numbers, but state_variables is {table.state_variables}")
+    material = umat.External(
+        str(around.folder / table.library), table.properties, table.state_variables, table.initial_state,
+        table.components, table.time_step, table.thread_safe,
+    )  # fmt: skip
+    return Substance(material, None, {}, ("physical time in the external routine: TIME counts its calls",))
 
 
 @substance.register
@@ -147,8 +164,8 @@ def _sand(table: said.ChangHicher, units: Units) -> Any:
     if table.preset not in SANDS:
         raise MisfitError("preset", f"there is no sand '{table.preset}'{suggest(table.preset, SANDS)}")
     sand = SANDS[table.preset](newtons=units.newtons, metres=units.metres)
-    changed = _changed(sand, table.parameters, "parameters")
-    return changed._replace(law=_law(table.fabric, sand.law), localisation=table.localisation)
+    sand_as_said = changed(sand, table.parameters, "parameters")
+    return sand_as_said._replace(law=_law(table.fabric, sand.law), localisation=table.localisation)
 
 
 def _law(fabric: said.Fabric | None, preset: Any) -> Any:
@@ -159,11 +176,11 @@ def _law(fabric: said.Fabric | None, preset: Any) -> Any:
     if fabric.law not in known:
         raise MisfitError("fabric.law", f"there is no fabric law '{fabric.law}'{suggest(fabric.law, known)}")
     record = known[fabric.law]
-    return _changed(preset if isinstance(preset, record) else record(), fabric.parameters, "fabric.parameters")
+    return changed(preset if isinstance(preset, record) else record(), fabric.parameters, "fabric.parameters")
 
 
-def _changed(record: Any, parameters: Mapping[str, float], place: str) -> Any:
-    """Return a record with some parameters replaced."""
+def changed(record: Any, parameters: Mapping[str, float], place: str) -> Any:
+    """Return a record with some parameters replaced; `MisfitError` with the place of one that it does not have."""
     numbers = [name for name, value in record._asdict().items() if isinstance(value, int | float)]
     for name in parameters:
         if name not in numbers:

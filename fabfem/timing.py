@@ -36,6 +36,11 @@ class Timer:
         """Return the time spent in each phase after a copy of `spent` was made [s]."""
         return {name: seconds - before[name] for name, seconds in self.spent.items()}
 
+    def resume(self, spent: Mapping[str, float], total: float) -> None:
+        """Count the times of an earlier run too, `total` in all."""
+        self.add({name: seconds for name, seconds in spent.items() if name in self.spent})
+        self._begun -= total
+
     def total(self) -> float:
         """Return the time since the timer was made [s]."""
         return perf_counter() - self._begun

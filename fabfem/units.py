@@ -22,10 +22,12 @@ NAMED_STRESSES = {
 
 DIMENSIONS = {
     "none": (0, 0),
+    "angle": (0, 0),
     "length": (0, 1),
     "force": (1, 0),
     "line_force": (1, -1),
     "stress": (1, -2),
+    "stress2": (2, -4),
     "unit_weight": (1, -3),
     "moment": (1, 1),
 }
@@ -64,6 +66,10 @@ class Units(NamedTuple):
             A key of `DIMENSIONS`.
         """
         force, length = DIMENSIONS[quantity]
+        if quantity == "angle":
+            return "deg"
+        if quantity == "stress2":
+            return f"({self.label('stress')})2"
         if (force, length) == (1, -2) and (self.force, self.length) in NAMED_STRESSES:
             return NAMED_STRESSES[self.force, self.length]
         above = " ".join([self.force] * force + [_power(self.length, length)] * (length > 0))

@@ -1,7 +1,8 @@
 """Make strip_half.msh: half of a strip footing B = 0.9 m on level ground, 6-node triangles.
 
 The domain is 5 B wide and 5 B deep, the surface at y = 0, the footing's base 0 ≤ x ≤ 0.45 m. Elements are finest at
-the footing's edge. Needs gmsh (``pip install gmsh``): ``python meshes/strip_half.py [FILE]``.
+the footing's edge; ``size=0.5`` halves all of them. Needs gmsh (``pip install gmsh``):
+``python meshes/strip_half.py [FILE [size=1]]``.
 """
 
 import sys
@@ -15,8 +16,8 @@ FINE, FOOTING, COARSE, GROWTH = 0.045, 0.05, 0.45, 0.085
 """Element size at the footing's edge (B/20), below the footing, and far away [m]; growth with the distance [-]."""
 
 
-def draw() -> None:
-    """Draw the domain and name its parts."""
+def draw(size: float) -> None:
+    """Draw the domain and name its parts, with elements `size` times as large as usual."""
     add = gmsh.model.geo
     corners = [(0, 0), (0, -DEPTH), (WIDTH, -DEPTH), (WIDTH, 0), (HALF, 0)]
     points = [add.addPoint(x, y, 0) for x, y in corners]
@@ -26,10 +27,10 @@ def draw() -> None:
     for name, line in zip(("symmetry", "bottom", "side", "surface", "footing"), lines, strict=True):
         gmsh.model.addPhysicalGroup(1, [line], name=name)
     gmsh.model.addPhysicalGroup(2, [ground], name="soil")
-    grade(edge=points[4], footing=lines[4])
+    grade(points[4], lines[4], size)
 
 
-def grade(edge: int, footing: int) -> None:
+def grade(edge: int, footing: int, factor: float) -> None:
     """Let the element size grow with the distance from the footing and from its edge."""
     field = gmsh.model.mesh.field
     sizes = []
@@ -38,7 +39,7 @@ def grade(edge: int, footing: int) -> None:
         field.setNumbers(distance, what, [tag])
         field.setNumber(distance, "Sampling", 200)
         size = field.add("MathEval")
-        field.setString(size, "F", f"Min({start} + {GROWTH} * F{distance}, {COARSE})")
+        field.setString(size, "F", f"{factor} * Min({start} + {GROWTH} * F{distance}, {COARSE})")
         sizes.append(size)
     smallest = field.add("Min")
     field.setNumbers(smallest, "FieldsList", sizes)
@@ -47,11 +48,11 @@ def grade(edge: int, footing: int) -> None:
         gmsh.option.setNumber(f"Mesh.{option}", 0)
 
 
-def main(path: Path) -> None:
-    """Write the mesh to `path`."""
+def main(path: Path, size: float = 1.0) -> None:
+    """Write the mesh to `path`, with elements `size` times as large as usual."""
     gmsh.initialize()
     gmsh.option.setNumber("General.Terminal", 0)
-    draw()
+    draw(size)
     gmsh.model.mesh.generate(2)
     gmsh.model.mesh.setOrder(2)
     gmsh.write(str(path))
@@ -59,4 +60,5 @@ def main(path: Path) -> None:
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).with_suffix(".msh"))
+    sizes = [float(word.removeprefix("size=")) for word in sys.argv[2:]]
+    main(Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).with_suffix(".msh"), *sizes)

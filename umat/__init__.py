@@ -16,6 +16,7 @@ from umat.interface import (
     state_fields,
     symmetric_tangent,
     update,
+    weakened,
 )
 from umat.threads import set_threads
 
@@ -24,6 +25,7 @@ __all__ = [
     "Directions",
     "DruckerPrager",
     "Elastic",
+    "External",
     "MohrCoulomb",
     "Response",
     "VonMises",
@@ -33,6 +35,7 @@ __all__ = [
     "state_fields",
     "symmetric_tangent",
     "update",
+    "weakened",
 ]
 
 _HOMES = {
@@ -40,6 +43,7 @@ _HOMES = {
     "Directions": "directions",
     "DruckerPrager": "drucker_prager",
     "Elastic": "elastic",
+    "External": "external",
     "MohrCoulomb": "mohr_coulomb",
     "VonMises": "von_mises",
 }

@@ -7,7 +7,8 @@ is that of the elastic trial stress, so the return is one of the pair (p, q),
     p = p_tr + K β Δκ,   q = q_tr − 3 G Δκ,   Δκ = f_tr / (3 G + M K β + H),
 
 or, if that overshoots q = 0, to the apex q = 0, p = −k/M with Δκ = q_tr/3G, which joins
-it continuously.  With M = β = 0 the cone is von Mises' cylinder, which has no apex
+it continuously.  With H < 0 the strength k falls to a residual one, where H is zero.
+With M = β = 0 the cone is von Mises' cylinder, which has no apex
 (de Souza Neto, Perić & Owen 2008, boxes 7.3, 8.8 to 8.10, compression positive).
 """
 
@@ -34,7 +35,9 @@ class Cone(NamedTuple):
     strength: float
     """q of the yield surface at p = 0 without plastic strain (k0) [stress]."""
     hardening: float
-    """Increase of that strength with plastic strain (H) [stress]."""
+    """Increase of that strength with plastic strain (H) [stress]; negative softens."""
+    residual: float = 0.0
+    """Strength at which softening ends [stress]."""
 
 
 @njit(cache=True, nogil=True)
@@ -85,17 +88,23 @@ def split_trial(bulk, shear, strain_increment, old_stress, normal):
 def return_pair(cone, p_trial, q_trial, kappa):
     """Return p, q, Δκ and ∂p/∂p_tr, ∂p/∂q_tr, ∂q/∂p_tr, ∂q/∂q_tr."""
     strength = cone.strength + cone.hardening * kappa
+    hardening = cone.hardening
+    if hardening < 0.0 and strength <= cone.residual:
+        strength, hardening = cone.residual, 0.0
     excess = q_trial - cone.friction * p_trial - strength
     if excess <= 0.0:
         return p_trial, q_trial, 0.0, 1.0, 0.0, 0.0, 1.0
     stiff, push = 3.0 * cone.shear, cone.bulk * cone.dilation
-    modulus = stiff + cone.friction * push + cone.hardening
+    modulus = stiff + cone.friction * push + hardening
     slip = excess / modulus
+    if hardening < 0.0 and strength + hardening * slip < cone.residual:
+        slip = (excess + strength - cone.residual) / (modulus - hardening)
+        strength, modulus, hardening = cone.residual, modulus - hardening, 0.0
     q = q_trial - stiff * slip
     if q < 0.0 and cone.friction > 0.0:
         slip = q_trial / stiff
-        apex = -(strength + cone.hardening * slip) / cone.friction
-        return apex, 0.0, slip, 0.0, -cone.hardening / cone.friction / stiff, 0.0, 0.0
+        apex = -(strength + hardening * slip) / cone.friction
+        return apex, 0.0, slip, 0.0, -hardening / cone.friction / stiff, 0.0, 0.0
     p = p_trial + push * slip
     p_p, p_q = 1.0 - cone.friction * push / modulus, push / modulus
     q_p, q_q = cone.friction * stiff / modulus, 1.0 - stiff / modulus

@@ -19,6 +19,7 @@ from umat.interface import (
     state_fields,
     symmetric_tangent,
     update,
+    weakened,
 )
 from umat.mandel import Array, p, q
 from umat.plastic import PlasticState, closed_form, unstrained
@@ -125,6 +126,19 @@ def _(material: DruckerPrager, state: PlasticState) -> dict[str, Array]:
 def _(material: DruckerPrager, state: PlasticState) -> Array:
     elastic = Elastic(material.youngs_modulus, material.poisson_ratio)
     return elastic_tangent(elastic, state)
+
+
+@weakened.register
+def _(material: DruckerPrager, factor: float) -> DruckerPrager:
+    """Return M/F, k0/F, H/F and β, unless that is more than M/F; associated flow stays associated."""
+    friction = material.friction_slope / factor
+    associated = material.dilation_slope == material.friction_slope
+    return material._replace(
+        friction_slope=friction,
+        dilation_slope=friction if associated else min(material.dilation_slope, friction),
+        strength=material.strength / factor,
+        hardening_modulus=material.hardening_modulus / factor,
+    )
 
 
 def _cone(material: DruckerPrager) -> Cone:

@@ -13,6 +13,7 @@ from umat.interface import (
     state_fields,
     symmetric_tangent,
     update,
+    weakened,
 )
 from umat.mandel import IDENTITY, SPHERICAL, Array, trace
 from umat.status import BAD_INPUT, OK
@@ -96,6 +97,12 @@ def _(material: Elastic) -> bool:
 @state_fields.register
 def _(material: Elastic, state: ElasticState) -> dict[str, Array]:
     return {}
+
+
+@weakened.register
+def _(material: Elastic, factor: float) -> Elastic:
+    """Return the material itself, which has no strength."""
+    return material
 
 
 @elastic_tangent.register

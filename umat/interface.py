@@ -65,6 +65,22 @@ def elastic_tangent(material: Any, state: Any) -> Array:
     raise _unknown(material, "elastic_tangent")
 
 
+@singledispatch
+def weakened(material: Any, factor: float) -> Any:
+    """Return the material with its strength divided by a factor.
+
+    A record that does not say otherwise and has a `friction_angle` [degrees] gets tan φ / factor in its place.
+    """
+    if not hasattr(material, "friction_angle"):
+        raise _unknown(material, "weakened")
+    return material._replace(friction_angle=reduced_angle(material.friction_angle, factor))
+
+
+def reduced_angle(angle: float, factor: float) -> float:
+    """Return arctan(tan(angle) / factor), angles in degrees."""
+    return float(np.degrees(np.arctan(np.tan(np.radians(angle)) / factor)))
+
+
 def checked_vectors(name: str, vectors: ArrayLike, n_points: int | None = None) -> Array:
     """Return C-contiguous float64 (n, 6) vectors; ValueError if the shape differs."""
     vectors = np.ascontiguousarray(vectors, dtype=np.float64)

@@ -15,9 +15,11 @@ from umat.interface import (
     Response,
     elastic_tangent,
     initial_state,
+    reduced_angle,
     state_fields,
     symmetric_tangent,
     update,
+    weakened,
 )
 from umat.mandel import Array, principal
 from umat.plastic import PlasticState, closed_form, unstrained
@@ -77,6 +79,15 @@ def _(material: MohrCoulomb, state: PlasticState) -> dict[str, Array]:
 def _(material: MohrCoulomb, state: PlasticState) -> Array:
     elastic = Elastic(material.youngs_modulus, material.poisson_ratio)
     return elastic_tangent(elastic, state)
+
+
+@weakened.register
+def _(material: MohrCoulomb, factor: float) -> MohrCoulomb:
+    """Return c/F, tan φ/F and ψ, unless that is more than φ is then; associated flow stays associated."""
+    friction = reduced_angle(material.friction_angle, factor)
+    associated = material.dilation_angle == material.friction_angle
+    dilation = friction if associated else min(material.dilation_angle, friction)
+    return material._replace(cohesion=material.cohesion / factor, friction_angle=friction, dilation_angle=dilation)
 
 
 def _pyramid(material: MohrCoulomb) -> Pyramid:

@@ -12,6 +12,8 @@ PRESSURE_RANGE = 4
 VOID_RATIO_RANGE = 5
 FABRIC_LIMIT = 6
 BAD_INPUT = 7
+CUT_BACK = 8
+OUTSIDE_FAULT = 9
 
 _MESSAGES = {
     OK: "The point was updated.",
@@ -25,6 +27,9 @@ _MESSAGES = {
     FABRIC_LIMIT: "The fabric would make the density of contacts negative in some "
     "direction; check the initial fabric or try a smaller increment.",
     BAD_INPUT: "A strain increment or an old state is not a finite number.",
+    CUT_BACK: "The external routine asks for a smaller increment (PNEWDT < 1).",
+    OUTSIDE_FAULT: "The external routine returned a stress, a state or a tangent that is not a finite number; "
+    "try a smaller increment, and `fabfem check-umat`.",
 }
 
 CODES = tuple(_MESSAGES)

@@ -1,10 +1,11 @@
-"""Von Mises plasticity with linear isotropic hardening, q = σ_y + H ε_p.
+"""Von Mises plasticity with linear isotropic hardening, q = σ_y + H ε_p, or softening to a residual σ_r.
 
 ε_p is the equivalent plastic strain ∫ √(2/3) ‖ε̇^p‖ dt.
 """
 
 from typing import Any, NamedTuple
 
+import numpy as np
 from numpy.typing import ArrayLike
 
 from umat.cone import Cone, return_slice
@@ -16,6 +17,7 @@ from umat.interface import (
     state_fields,
     symmetric_tangent,
     update,
+    weakened,
 )
 from umat.mandel import Array, q
 from umat.plastic import PlasticState, closed_form, unstrained
@@ -31,7 +33,9 @@ class VonMises(NamedTuple):
     yield_stress: float
     """Yield stress in uniaxial loading (σ_y) [stress]; √3 times the shear strength."""
     hardening_modulus: float = 0.0
-    """Slope of the yield stress against plastic strain (H) [stress]."""
+    """Slope of the yield stress against plastic strain (H) [stress]; negative softens, above −3 G."""
+    residual_stress: float = 0.0
+    """Yield stress at which softening ends (σ_r) [stress]."""
 
 
 @update.register
@@ -43,7 +47,9 @@ def _(material: VonMises, directions: Any, strain_increment: ArrayLike, old: Pla
 def _(material: VonMises, directions: Any, stress: ArrayLike) -> PlasticState:
     check_moduli(material.youngs_modulus, material.poisson_ratio)
     check("yield_stress", material.yield_stress, 0.0)
-    check("hardening_modulus", material.hardening_modulus, 0.0)
+    softest = -3.0 * shear_modulus(material.youngs_modulus, material.poisson_ratio)
+    check("hardening_modulus", material.hardening_modulus, np.nextafter(softest, 0.0))
+    check("residual_stress", material.residual_stress, 0.0, material.yield_stress)
     return unstrained(stress)
 
 
@@ -55,7 +61,7 @@ def _(material: VonMises) -> bool:
 @state_fields.register
 def _(material: VonMises, state: PlasticState) -> dict[str, Array]:
     plastic_strain = state.plastic_strain
-    strength = material.yield_stress + material.hardening_modulus * plastic_strain
+    strength = np.maximum(material.yield_stress + material.hardening_modulus * plastic_strain, material.residual_stress)
     return {
         "plastic_strain": plastic_strain,
         "mobilised_strength": q(state.stress) / strength,
@@ -68,6 +74,16 @@ def _(material: VonMises, state: PlasticState) -> Array:
     return elastic_tangent(elastic, state)
 
 
+@weakened.register
+def _(material: VonMises, factor: float) -> VonMises:
+    """Return σ_y/F, H/F and σ_r/F."""
+    return material._replace(
+        yield_stress=material.yield_stress / factor,
+        hardening_modulus=material.hardening_modulus / factor,
+        residual_stress=material.residual_stress / factor,
+    )
+
+
 def _cylinder(material: VonMises) -> Cone:
     """Return the cone without slope that the yield surface is."""
     return Cone(
@@ -77,4 +93,5 @@ def _cylinder(material: VonMises) -> Cone:
         dilation=0.0,
         strength=float(material.yield_stress),
         hardening=float(material.hardening_modulus),
+        residual=float(material.residual_stress),
     )

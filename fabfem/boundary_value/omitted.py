@@ -18,7 +18,10 @@ def left_out(
 ) -> Iterator[str]:
     """Yield a sentence for each thing that a scene does without."""
     nodes = len(space.mesh.points)
-    yield f"no pore pressure: the scene is dry ({nodes} unknowns fewer)"
+    if case.water is None:
+        yield f"no pore pressure: the scene is dry ({_corners(space)} unknowns fewer)"
+    elif not case.water.excess:
+        yield f"no excess pore pressure: it is given ({_corners(space)} unknowns fewer)"
     missing = 3 - len(space.components)
     if missing:
         reason = (
@@ -30,6 +33,10 @@ def left_out(
     idle = sorted(set(fields) - set(case.output.fields if case.output else ()))
     if idle:
         yield f"not gathered, because not asked for: {', '.join(idle)}"
+
+
+def _corners(space: Space) -> int:
+    return len(np.unique(space.mesh.cells[:, : len(space.mesh.element.corners)]))
 
 
 def remaining(model: Model) -> Iterator[tuple[str, str]]:

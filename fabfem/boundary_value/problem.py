@@ -4,19 +4,31 @@ What is wrong in a case and can only be seen here (a boundary that the mesh lack
 `CaseError` with one sentence naming the place in the file.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+
+import numpy as np
 
 import umat
-from fabfem.boundary_value.fields import known_fields
+from fabfem.boundary_value.conditioning import conditioning_columns
+from fabfem.boundary_value.errors import FIELD, Discretisation, error_columns
+from fabfem.boundary_value.fields import known_fields, point_tensors
+from fabfem.boundary_value.ground import ground_stress, zones_of
+from fabfem.boundary_value.hollow_cylinder import hollow_cylinder_columns
+from fabfem.boundary_value.meshes import mesh_of, mesh_place
 from fabfem.boundary_value.omitted import left_out
 from fabfem.boundary_value.probes import Column, columns
-from fabfem.boundary_value.program import ground_stress, program, zones_of
-from fabfem.case import BoundaryValueCase, CaseError, boundaries_of, nearest, suggest
+from fabfem.boundary_value.program import Scene, program
+from fabfem.boundary_value.water import pore_water
+from fabfem.case import BoundaryValueCase, CaseError, boundaries_of, nearest, suggest, zones_named
+from fabfem.case.materials import ChangHicher
 from fabfem.fem.kinematics import KINEMATICS
-from fabfem.fem.mesh import Mesh, read_mesh
+from fabfem.fem.loads import loading
+from fabfem.fem.mesh import Mesh
 from fabfem.fem.model import Controls, Model, Zone
+from fabfem.fem.pores import porous
+from fabfem.fem.solve import absent_dofs
 from fabfem.fem.space import Space, build_space
 from fabfem.fem.stages import Stage
 from fabfem.fem.supports import constrain
@@ -35,6 +47,8 @@ class Problem:
         Space, zones, stages and controls.
     columns : tuple of Column
         Columns of the history.
+    mesh_error : Discretisation or None
+        Estimate of the mesh's error, where the case asks for it.
     omitted : tuple of str
         Sentences on what the scene leaves out.
     """
@@ -42,6 +56,7 @@ class Problem:
     case: BoundaryValueCase
     model: Model
     columns: tuple[Column, ...]
+    mesh_error: Discretisation | None
     omitted: tuple[str, ...]
 
 
@@ -56,28 +71,66 @@ def build(case: BoundaryValueCase) -> Problem:
     space = _space(case)
     substances = {name: _substance(case, name, space) for name in case.material}
     zones = {zone: filled for name in case.material for zone, filled in _zones(case, name, space, substances[name])}
-    _check_fields(case, zones)
+    stages = _stages(case, space, substances, zones)
     with _blamed(case, "material"):
-        model = Model(space, zones, _stages(case, space), _controls(case), case.solver.linear)
+        known = known_fields(zones | dict(_spare(substances, zones)), case.water is not None)
+    _check_fields(case, known)
+    _check_probes(case, zones)
+    with _blamed(case, "material"):
+        filling = {zone: name for name in case.material for zone in zones_of(case, name, space.mesh)}
+        water = pore_water(case, space, zones, filling)
+        model = Model(space, zones, stages, _controls(case), case.solver.linear, water)
     with _blamed(case, "probe or reaction"):
-        found = columns(case, space)
+        found = columns(case, space, stages)
+    with _blamed(case, "hollow_cylinder"):
+        found = (*found, *hollow_cylinder_columns(case, space))
+    with _blamed(case, "errors"):
+        errors, mesh_error = error_columns(case, model, lambda rule: _with_rule(case, space, rule))
+    diagnosed = conditioning_columns(model) if case.solver.diagnose else ()
     if case.solver.threads:
         umat.set_threads(case.solver.threads)
-    return Problem(case, model, found, tuple(left_out(case, space, known_fields(zones), substances)))
+    omitted = tuple(left_out(case, space, known, substances))
+    return Problem(case, model, (*found, *errors, *diagnosed), mesh_error, omitted)
 
 
 def _space(case: BoundaryValueCase) -> Space:
-    with _blamed(case, "mesh.file"):
-        mesh = read_mesh(case.locate(case.mesh.file), case.mesh.order)
+    with _blamed(case, mesh_place(case)):
+        mesh = mesh_of(case)
     _check_names(case, mesh)
-    with _blamed(case, "scene.kinematics"):
-        return build_space(mesh, KINEMATICS[case.scene.kinematics])
+    kinematics = KINEMATICS[case.scene.kinematics]
+    with _blamed(case, "mesh.points" if case.mesh.points else "scene.kinematics"):
+        space = build_space(mesh, replace(kinematics, mean_dilation=_mean_dilation(case, mesh)), case.mesh.points)
+    with _blamed(case, "water.excess"):
+        return porous(space) if case.water is not None and case.water.excess else space
+
+
+def _mean_dilation(case: BoundaryValueCase, mesh: Mesh) -> bool:
+    """Return whether the volume strain is a mean over patches: what the case says, or for linear elements."""
+    said = case.mesh.volume_strain
+    return not mesh.element.linear if said is None else said == "mean"
 
 
 def _substance(case: BoundaryValueCase, name: str, space: Space) -> Substance:
-    flat = case.scene.kinematics in ("plane_strain", "axisymmetric")
     with _blamed(case, f"material.{name}"):
-        return substance(case.material[name], Surroundings(case.unit_system, space.mesh.dim - 1, flat))
+        return substance(case.material[name], _surroundings(case, space))
+
+
+def _surroundings(case: BoundaryValueCase, space: Space) -> Surroundings:
+    flat = case.scene.kinematics in ("plane_strain", "axisymmetric")
+    return Surroundings(case.unit_system, space.mesh.dim - 1, flat, case.path.parent)
+
+
+def _with_rule(case: BoundaryValueCase, space: Space, rule: str) -> dict[str, Substance]:
+    """Return the substance of each zone that has contact directions, with another rule of them."""
+    found: dict[str, Substance] = {}
+    for name, table in case.material.items():
+        if isinstance(table, ChangHicher):
+            try:
+                filling = substance(table.model_copy(update={"directions": rule}), _surroundings(case, space))
+            except MisfitError as error:
+                raise CaseError(f"{case.path.name}: errors.rule: {error}") from error
+            found |= dict.fromkeys(zones_of(case, name, space.mesh), filling)
+    return found
 
 
 def _zones(case: BoundaryValueCase, name: str, space: Space, filling: Substance) -> Iterator[tuple[str, Zone]]:
@@ -89,12 +142,29 @@ def _zones(case: BoundaryValueCase, name: str, space: Space, filling: Substance)
         yield zone, Zone(filling.material, filling.directions, state, space.points_of(space.mesh.zone(zone)))
 
 
-def _stages(case: BoundaryValueCase, space: Space) -> tuple[Stage, ...]:
-    stages = program(case, space)
-    for stage in stages:
-        with _blamed(case, f"stage[{stage.name}]"):
-            constrain(space, stage.supports)
-    return stages
+def _stages(
+    case: BoundaryValueCase, space: Space, substances: Mapping[str, Substance], zones: Mapping[str, Zone]
+) -> tuple[Stage, ...]:
+    found, course = [], program(Scene(case, space, substances))
+    for said in case.stage:
+        with _blamed(case, f"stage[{said.name}]"):
+            stage = next(course)
+            gone = absent_dofs(space, {zone: zones[zone] for zone in stage.absent})
+            constrain(space, stage.supports, stage.bodies, gone)
+            loading(space, stage.loads)
+        found.append(stage)
+    return tuple(found)
+
+
+def _spare(substances: Mapping[str, Substance], zones: Mapping[str, Zone]) -> Iterator[tuple[str, Zone]]:
+    """Yield (name, zone of one point) of the materials that no zone has at first, for the fields that they have."""
+    used = [zone.material for zone in zones.values()]
+    for name, spare in substances.items():
+        if spare.material not in used:
+            state = umat.initial_state(
+                spare.material, spare.directions, np.eye(1, 6) + np.eye(1, 6, 1) + np.eye(1, 6, 2), **spare.needs
+            )
+            yield f"[{name}]", Zone(spare.material, spare.directions, state, slice(0, 0))
 
 
 def _controls(case: BoundaryValueCase) -> Controls:
@@ -115,19 +185,35 @@ def _check_names(case: BoundaryValueCase, mesh: Mesh) -> None:
 
 def _named(case: BoundaryValueCase) -> Iterator[tuple[str, str, str]]:
     """Yield (place, kind, name) of every zone and boundary that a case names."""
-    for key, material in case.material.items():
-        yield from ((f"material.{key}.zones", "zone", name) for name in material.zones or ())
+    for place, names in zones_named(case):
+        yield from ((place, "zone", name) for name in names)
     for place, names in boundaries_of(case):
         yield from ((place, "boundary", name) for name in names)
 
 
-def _check_fields(case: BoundaryValueCase, zones: Mapping[str, Zone]) -> None:
-    known = known_fields(zones)
+def _check_fields(case: BoundaryValueCase, known: Sequence[str]) -> None:
+    estimated = (FIELD,) if case.errors and "discretisation" in case.errors.estimate else ()
+    known = (*known, *estimated)
     for name in case.output.fields if case.output else ():
         if name not in known:
             raise CaseError(
                 f"{case.path.name}: output.fields: no material here has a field '{name}'{suggest(name, known)}"
             )
+
+
+def _check_probes(case: BoundaryValueCase, zones: Mapping[str, Zone]) -> None:
+    """Refuse probes of fields that no point has, or that do not say which entry of a tensor they mean."""
+    tensors = point_tensors(zones)
+    for probe in case.probe:
+        if probe.field is None:
+            continue
+        where = f"{case.path.name}: probe[{probe.name}]"
+        if probe.field not in tensors:
+            hint = suggest(probe.field, tensors)
+            raise CaseError(f"{where}.field: no material here has a field '{probe.field}' at its points{hint}")
+        if tensors[probe.field] != (probe.entry is not None):
+            what = "a tensor and needs an entry, such as xx" if tensors[probe.field] else "a number and has no entry"
+            raise CaseError(f"{where}.entry: '{probe.field}' is {what}")
 
 
 @contextmanager

@@ -1,17 +1,31 @@
 """A boundary-value run from the case to the last row: march the problem, write what converges, say how it ended."""
 
+import json
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
-from fabfem.boundary_value.omitted import remaining
+import numpy as np
+
+from fabfem.boundary_value.audit import audited
+from fabfem.boundary_value.omitted import memory, remaining
+from fabfem.boundary_value.price import price as price_of
+from fabfem.boundary_value.price import remember as remember_run
 from fabfem.boundary_value.problem import Problem, build
-from fabfem.boundary_value.record import PHASES, Recorder
-from fabfem.case import BoundaryValueCase
-from fabfem.case.stages import Geostatic
-from fabfem.fem.solve import Increment, Stopped, march
+from fabfem.boundary_value.record import PHASES, Recorder, Written, recall
+from fabfem.boundary_value.safety import sentence
+from fabfem.case import BoundaryValueCase, CaseError
+from fabfem.fem.flow import UNDECIDED
+from fabfem.fem.increment import Collapsed, Increment, Stopped
+from fabfem.fem.mesh import Mesh
+from fabfem.fem.solve import march
+from fabfem.fem.start import misfit
+from fabfem.identity import hashed, identity
 from fabfem.outcome import Description, Outcome, make_folder, short
+from fabfem.output.checkpoints import Checkpoint
 from fabfem.output.interrupt import held_back
 from fabfem.output.progress import Quiet, Terminal
+from fabfem.restart import FRESH, Restart, checkpoint_of
 from fabfem.timing import Timer
 
 
@@ -24,17 +38,39 @@ def describe(case: BoundaryValueCase) -> Description:
         If the case cannot be run.
     """
     problem = build(case)
-    return Description(problem.omitted, tuple(remaining(problem.model)))
+    return Description(problem.omitted, tuple(remaining(problem.model)), memory(problem.model))
 
 
-def run(case: BoundaryValueCase, folder: Path, quiet: bool, timer: Timer | None = None) -> Outcome:
+def price(case: BoundaryValueCase) -> str:
+    """Return what a run of a case will cost, in a sentence; `CaseError` if it cannot be run."""
+    cost = price_of(build(case))
+    return f"about {_duration(cost.seconds)}, judged by {cost.source}"
+
+
+def remember(case: BoundaryValueCase, folder: Path) -> None:
+    """Keep what a completed run has cost, for the price of the next one of its kind."""
+    remember_run(build(case), json.loads((folder / "report.json").read_text(encoding="utf-8")))
+
+
+def _duration(seconds: float) -> str:
+    """Return a time with the unit that suits it."""
+    if seconds < 120.0:
+        return f"{seconds:.2g} s"
+    return f"{seconds / 60.0:.0f} min" if seconds < 7200.0 else f"{seconds / 3600.0:.1f} h"
+
+
+def run(
+    case: BoundaryValueCase, folder: Path, quiet: bool, timer: Timer | None = None, restart: Restart = FRESH
+) -> Outcome:
     """Run a case and write its results into a folder; see `fabfem.run.run_case`."""
     timer = timer or Timer(PHASES)
     with timer.phase("mesh"):
         problem = build(case)
-        steps = march(problem.model)
+        known = identity(case, mesh=_hashed(problem.model.space.mesh))
+        begun = checkpoint_of(restart, folder, known)
+        steps = _steps(problem, begun, restart)
     make_folder(folder)
-    recorder = Recorder(problem, folder, timer)
+    recorder = _recorder(problem, folder, timer, known, begun, restart)
     stages = len(problem.model.stages)
     with Quiet() if quiet else Terminal(stages) as shown:
         status, reason = _drive(steps, recorder, shown)
@@ -43,18 +79,68 @@ def run(case: BoundaryValueCase, folder: Path, quiet: bool, timer: Timer | None 
     return Outcome(status, reason, folder, len(recorder.report.content["increments"]), last, timer.total())
 
 
-def _drive(steps: Iterator[Increment | Stopped], recorder: Recorder, shown: Quiet) -> tuple[str, str]:
+def replay(case: BoundaryValueCase, start: Any) -> tuple[tuple[str, float, str] | None, list[str]]:
+    """Return how the next increment after a start fails (stage, fraction, reason), None if not, and a line a try."""
+    step = next(march(build(case).model, start))
+    assert not isinstance(step, Collapsed)
+    tries = [
+        f"  increment of {100 * cut.size:.4g} %: {cut.reason}; residuals {' '.join(f'{r:.1e}' for r in cut.residuals)}"
+        for cut in step.cutbacks
+    ]
+    return (step.stage, step.fraction, step.reason) if isinstance(step, Stopped) else None, tries
+
+
+def _steps(problem: Problem, begun: Checkpoint | None, restart: Restart) -> Iterator[Increment | Stopped | Collapsed]:
+    """Return the march from a checkpoint; `CaseError` where the case cannot go on from it."""
+    start = begun.start if begun else None
+    why = misfit(problem.model, start) if start else ""
+    if why:
+        raise CaseError(f"{problem.case.path.name}: it cannot go on from the state in {restart.branch}: {why}")
+    return march(problem.model, start)
+
+
+def _recorder(
+    problem: Problem,
+    folder: Path,
+    timer: Timer,
+    known: dict[str, Any],
+    begun: Checkpoint | None,
+    restart: Restart,
+) -> Recorder:
+    if begun is None or restart.branch is None:
+        return Recorder(problem, folder, timer, known, *((begun.start, Written(**begun.written)) if begun else ()))
+    gathering = [column.name for column in problem.columns if column.keeper]
+    if set(gathering) - set(begun.written["keepers"]):
+        raise CaseError(f"{problem.case.path.name}: errors: {restart.branch} has not gathered {', '.join(gathering)}")
+    recorder = Recorder(problem, folder, timer, known, begun.start)
+    recall(problem.columns, begun.written["keepers"])
+    start = begun.start
+    told = {"folder": str(restart.branch), "stage": start.stage, "increment": start.number}
+    recorder.report.content["branch"] = told | {"hash": begun.identity["hash"]}
+    return recorder
+
+
+def _hashed(mesh: Mesh) -> str:
+    """Return a hash of a mesh with its names."""
+    parts = (mesh.zones, mesh.boundaries)
+    named = [part for table in parts for name, ids in table.items() for part in (name.encode(), np.asarray(ids))]
+    return hashed(mesh.points, mesh.cells, mesh.cell_type.encode(), *named)
+
+
+def _drive(steps: Iterator[Increment | Stopped | Collapsed], recorder: Recorder, shown: Quiet) -> tuple[str, str]:
     """March to the end and return the status and the reason."""
     case = recorder.problem.case
     try:
         for step in steps:
             if isinstance(step, Stopped):
-                recorder.timer.add(step.timings)
+                recorder.stopped(step)
                 return recorder.end("stopped", _why(step, recorder.problem), step.cutbacks)
+            if isinstance(step, Collapsed):
+                return _found(step, recorder, shown)
             with held_back():
                 recorder.add(step)
-            if isinstance(case.stage[step.stage_index], Geostatic):
-                shown.say(_audit(step, case.units.length))
+            if audited(recorder.problem, step):
+                shown.say(_audit(recorder.report.content["audit"], case.units.length))
             shown.advance(step.stage, step.stage_index + step.fraction, step.number, step.iterations)
     except KeyboardInterrupt:
         return recorder.end("interrupted", "interrupted; all increments that converged are kept")
@@ -63,10 +149,20 @@ def _drive(steps: Iterator[Increment | Stopped], recorder: Recorder, shown: Quie
     return recorder.end("completed", "")
 
 
-def _audit(step: Increment, length: str) -> str:
-    """Return how far the initial state was from equilibrium."""
-    unbalanced = f"out of balance by {step.out_of_balance:.1e} of the forces at work"
-    return f"{step.stage}: {unbalanced}, moved {step.moved:.1e} {length}"
+def _found(end: Collapsed, recorder: Recorder, shown: Quiet) -> tuple[str, str]:
+    """Record the factor of safety and return status and reason."""
+    with held_back():
+        recorder.failed(end)
+    shown.say(sentence(end))
+    if end.last_equilibrium is None or end.verdict == UNDECIDED:
+        return recorder.end("stopped", sentence(end))
+    return recorder.end("completed", "")
+
+
+def _audit(found: dict[str, Any], length: str) -> str:
+    """Return how far the initial state was from equilibrium, and why."""
+    unbalanced = f"out of balance by {found['out_of_balance']:.1e} of the forces at work"
+    return f"{found['stage']}: {unbalanced}, moved {found['moved']:.1e} {length}; {found['why']}"
 
 
 def _why(stopped: Stopped, problem: Problem) -> str:

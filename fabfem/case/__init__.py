@@ -5,8 +5,10 @@ names that only those can vouch for are checked when the problem is built, with 
 """
 
 from fabfem.case.boundary_value import BoundaryValueCase
-from fabfem.case.names import boundaries_of
-from fabfem.case.reader import case_from, read_case, resolved
+from fabfem.case.element import ElementCase
+from fabfem.case.fabric import FabricCase
+from fabfem.case.names import boundaries_of, zones_named
+from fabfem.case.reader import case_from, read_case, read_tables, resolved
 from fabfem.case.schema import Case
 from fabfem.case.sentences import CaseError
 from fabfem.case.table import nearest, suggest
@@ -15,10 +17,14 @@ __all__ = [
     "BoundaryValueCase",
     "Case",
     "CaseError",
+    "ElementCase",
+    "FabricCase",
     "boundaries_of",
     "case_from",
     "nearest",
     "read_case",
+    "read_tables",
     "resolved",
     "suggest",
+    "zones_named",
 ]

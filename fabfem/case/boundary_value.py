@@ -4,9 +4,11 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
+from fabfem.case.mesh import Mesh
 from fabfem.case.schema import AnyScene, Case
 from fabfem.case.stages import AnyStage, Component, Support
 from fabfem.case.table import Factors, Identifier, Names, NotNegative, Positive, Table, Text
+from fabfem.case.water import Water
 
 
 class Scene(AnyScene):
@@ -16,15 +18,6 @@ class Scene(AnyScene):
     """Kind of scene."""
     kinematics: Literal["plane_strain", "axisymmetric", "axisymmetric_torsion", "solid"]
     """Displacements that the scene has, and the strains they make."""
-
-
-class Mesh(Table):
-    """The mesh."""
-
-    file: Text
-    """File in any format of meshio, with named boundaries and zones; relative to the case file."""
-    order: Annotated[int, Field(ge=1, le=2)] = 2
-    """Order of the displacement in an element."""
 
 
 class Solver(Table):
@@ -42,21 +35,29 @@ class Solver(Table):
     """Linear solver; auto takes PARDISO where it is installed."""
     threads: Annotated[int, Field(ge=0)] = 0
     """Threads for the material points; 0 takes the cores there are."""
+    diagnose: bool = False
+    """Whether condition number and pivot growth of the stiffness are recorded after every increment."""
 
 
 class Probe(Table):
-    """A displacement written to the history."""
+    """A displacement, or a pore pressure, written to the history."""
 
     name: Identifier
     """Name of the column."""
-    kind: Literal["displacement"] = "displacement"
-    """What is probed."""
+    kind: Literal["displacement", "pore_pressure", "mean", "deviation"] = "displacement"
+    """What is probed: at nodes, or the volume mean or standard deviation of a field."""
     boundary: Names | None = None
     """Boundaries over whose nodes the mean is taken."""
     point: Annotated[tuple[float, ...], Field(min_length=2, max_length=3, strict=False)] | None = None
     """Point whose nearest node is taken, instead of a boundary."""
-    component: Component
-    """Component of the displacement."""
+    component: Component | None = None
+    """Component of the displacement; a pore pressure has none."""
+    field: Identifier | None = None
+    """Field of the points whose mean or deviation is taken."""
+    entry: Literal["xx", "yy", "zz", "yz", "xz", "xy"] | None = None
+    """Entry of a field that is a tensor, along the axes of the mesh (about an axis: x = r, y = z, z = theta)."""
+    zones: Names | None = None
+    """Zones over which they are taken; all when left out."""
     scale: float = 1.0
     """Factor on the value."""
 
@@ -87,6 +88,17 @@ class Derived(Table):
     """Unit of the result."""
 
 
+class HollowCylinder(Table):
+    """A hollow cylinder whose averages are written to the history, as a laboratory has them and as volume means."""
+
+    inner: Text
+    """Boundary at the inner radius."""
+    outer: Text
+    """Boundary at the outer radius."""
+    platen: Text
+    """Boundary that carries the axial force and the torque; the opposite end does not move along or around the axis."""
+
+
 class Output(Table):
     """What is stored besides the history."""
 
@@ -96,6 +108,20 @@ class Output(Table):
     """Store every so many increments; the end of a stage is always stored."""
     at: Annotated[tuple[Literal["nodes", "cells"], ...], Field(min_length=1, strict=False)] = ("nodes", "cells")
     """Smoothed at nodes, raw means in cells, or both."""
+
+
+class Errors(Table):
+    """Estimates of its own error that a run carries, a column of the history each."""
+
+    estimate: Annotated[
+        tuple[Literal["equilibrium", "integration", "discretisation", "directions"], ...],
+        Field(min_length=1, strict=False),
+    ]
+    """What is estimated."""
+    rule: Text = "lebedev_23"
+    """Second rule of contact directions, with which the directions' error is estimated."""
+    samples: Annotated[int, Field(ge=1)] = 16
+    """Points of each zone that go through the second rule."""
 
 
 class BoundaryValueCase(Case):
@@ -109,6 +135,8 @@ class BoundaryValueCase(Case):
     """Supports of all stages."""
     stage: Annotated[tuple[AnyStage, ...], Field(min_length=1, strict=False)]
     """Stages, in order."""
+    water: Water | None = None
+    """Water in the pores; a scene without it is dry."""
     solver: Solver = Solver()
     """Solution of the equations."""
     probe: Annotated[tuple[Probe, ...], Field(strict=False)] = ()
@@ -117,5 +145,9 @@ class BoundaryValueCase(Case):
     """Forces to record."""
     derived: Annotated[tuple[Derived, ...], Field(strict=False)] = ()
     """Columns made from others."""
+    hollow_cylinder: HollowCylinder | None = None
+    """Averages of a hollow cylinder to record; none when left out."""
     output: Output | None = None
     """Fields to store; none when left out."""
+    errors: Errors | None = None
+    """Errors to estimate; none when left out."""

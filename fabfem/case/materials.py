@@ -4,7 +4,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field, field_validator
 
-from fabfem.case.table import Angle, Names, NotNegative, Positive, Table, Text
+from fabfem.case.table import Angle, NotNegative, Positive, SomeNames, Table, Text
 
 SOLID_FRACTION_LIMIT = 13.28 / 8.0
 """Void ratio at which the number of contacts per particle, 13.28 - 8 e, vanishes [ZK table 3]."""
@@ -18,10 +18,16 @@ class Material(Table):
 
     model: str
     """Which material it is."""
-    zones: Names | None = None
-    """Zones of the mesh made of this material; all zones when left out."""
+    zones: SomeNames | None = None
+    """Zones of the mesh made of this material at first, [] for none; all zones when left out."""
     unit_weight: NotNegative = 0.0
-    """Unit weight that gravity acts on (buoyant below a water table)."""
+    """Unit weight that gravity acts on, above the water table."""
+    saturated_unit_weight: Positive | None = None
+    """Unit weight of soil and water together below the water table; gravity acts on it less that of water."""
+    conductivity: NotNegative = 0.0
+    """Hydraulic conductivity (k), for scenes where excess pore pressure flows off [length/time]."""
+    porosity: Annotated[float, Field(gt=0, lt=1)] | None = None
+    """Volume of pores over the whole, for compressible water; a Chang-Hicher material has it from its void ratio."""
 
 
 class Elastic(Material):
@@ -44,8 +50,10 @@ class VonMises(Material):
     """Poisson's ratio."""
     yield_stress: Positive
     """Yield stress in uniaxial loading, which is the square root of 3 times the shear strength [stress]."""
-    hardening_modulus: NotNegative = 0.0
-    """Slope of the yield stress against plastic strain [stress]."""
+    hardening_modulus: float = 0.0
+    """Slope of the yield stress against plastic strain, negative for softening [stress]."""
+    residual_stress: NotNegative = 0.0
+    """Yield stress at which softening ends [stress]."""
 
 
 class MohrCoulomb(Material):
@@ -135,4 +143,26 @@ class ChangHicher(Material):
         return void_ratio
 
 
-AnyMaterial = Annotated[Elastic | VonMises | MohrCoulomb | DruckerPrager | ChangHicher, Field(discriminator="model")]
+class Umat(Material):
+    """A compiled routine with the Abaqus UMAT argument list (small strain)."""
+
+    model: Literal["umat"]
+    library: Text
+    """Shared library with the routine; relative to the case file."""
+    properties: Annotated[tuple[float, ...], Field(strict=False)] = ()
+    """PROPS, in the routine's own units and sign."""
+    state_variables: Annotated[int, Field(ge=0)] = 0
+    """Number of state variables (NSTATV)."""
+    initial_state: Annotated[tuple[float, ...], Field(strict=False)] = ()
+    """State variables (STATEV) before the first increment; those left out are zero."""
+    components: Literal[4, 6] = 6
+    """Stress components that the routine knows (NTENS): 6, or 4 where it knows plane strain and axisymmetry only."""
+    time_step: Positive = 1.0
+    """Time increment (DTIME) of every call."""
+    thread_safe: bool = False
+    """Whether several threads may be in the routine at once."""
+
+
+AnyMaterial = Annotated[
+    Elastic | VonMises | MohrCoulomb | DruckerPrager | ChangHicher | Umat, Field(discriminator="model")
+]

@@ -9,6 +9,10 @@ from pydantic import ValidationError
 
 from fabfem.case.boundary_value import BoundaryValueCase
 from fabfem.case.contradictions import contradictions
+from fabfem.case.element import ElementCase
+from fabfem.case.element import contradictions as element_contradictions
+from fabfem.case.fabric import FabricCase
+from fabfem.case.fabric import contradictions as fabric_contradictions
 from fabfem.case.schema import Case
 from fabfem.case.sentences import CaseError, sentence
 from fabfem.case.table import suggest
@@ -16,6 +20,8 @@ from fabfem.case.toml import write_toml
 
 KINDS: dict[str, tuple[type[Case], Callable[[Any], Iterator[tuple[str, str]]]]] = {
     "boundary_value": (BoundaryValueCase, contradictions),
+    "fabric": (FabricCase, fabric_contradictions),
+    "element": (ElementCase, element_contradictions),
 }
 """What a case of each kind of scene may say, and the search for what no single table can see."""
 
@@ -34,7 +40,7 @@ def read_case(path: str | Path) -> Case:
         If the file cannot be read or says something impossible; the message is one sentence naming the place.
     """
     path = Path(path)
-    return case_from(_load(path), path)
+    return case_from(read_tables(path), path)
 
 
 def case_from(tables: dict[str, Any], path: str | Path = "case.toml") -> Case:
@@ -68,7 +74,8 @@ def resolved(case: Case) -> str:
     return write_toml(case.model_dump())
 
 
-def _load(path: Path) -> dict[str, Any]:
+def read_tables(path: Path) -> dict[str, Any]:
+    """Return the tables of a TOML file as they stand; `CaseError` if it cannot be read."""
     try:
         return tomllib.loads(path.read_text(encoding="utf-8"))
     except FileNotFoundError:

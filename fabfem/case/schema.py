@@ -6,7 +6,8 @@ from typing import Annotated, Literal
 from pydantic import Field, PrivateAttr
 
 from fabfem.case.materials import AnyMaterial
-from fabfem.case.table import Identifier, Table
+from fabfem.case.study import Calibration, Study, Sweep
+from fabfem.case.table import Identifier, NotNegative, Table
 from fabfem.units import FORCES, LENGTHS, Units
 
 
@@ -26,6 +27,15 @@ class UnitNames(Table):
     """Unit of force."""
 
 
+class Checkpoint(Table):
+    """When a run keeps a state that it can go on from; one is kept when it ends, too."""
+
+    seconds: NotNegative = 30.0
+    """Time between two [s]; longer where writing would take more than a twentieth of the time."""
+    increments: Annotated[int, Field(ge=1)] | None = None
+    """Increments between two, instead of a time."""
+
+
 class Case(Table):
     """What every case says."""
 
@@ -37,6 +47,15 @@ class Case(Table):
     """Units of the case."""
     material: Annotated[dict[Identifier, AnyMaterial], Field(min_length=1)]
     """Materials by name."""
+    sweep: Sweep | None = None
+    """Runs of the case with the product of some parameters."""
+    study: Study | None = None
+    """Runs of the case with other settings, for their error and time."""
+    calibration: Calibration | None = None
+    """Runs of the case that fit parameters to measured curves."""
+
+    checkpoint: Checkpoint = Checkpoint()
+    """When a run keeps a state that it can go on from."""
 
     _path: Path = PrivateAttr(Path("case.toml"))
 

@@ -29,6 +29,13 @@ Names = Annotated[
 ]
 """One name or a list of names."""
 
+SomeNames = Annotated[
+    tuple[Text, ...],
+    BeforeValidator(_as_list, json_schema_input_type=str | list[str]),
+    Field(strict=False),
+]
+"""One name or a list of names, which may be empty."""
+
 Factors = Annotated[
     tuple[float, ...],
     BeforeValidator(_as_list, json_schema_input_type=float | list[float]),

@@ -1,4 +1,4 @@
-"""Boxes cut into equal elements, with a name for every side."""
+"""Boxes cut into elements along each axis, with a name for every side."""
 
 from collections.abc import Sequence
 from itertools import permutations
@@ -13,12 +13,19 @@ SIDES = {2: (("left", "right"), ("bottom", "top")), 3: (("left", "right"), ("fro
 
 
 def box_mesh(cell_type: str, counts: Sequence[int], lower: Sequence[float], upper: Sequence[float]) -> Mesh:
-    """The box from corner `lower` to corner `upper` cut into `counts` cells along each axis.
+    """The box from corner `lower` to corner `upper` cut into `counts` equal cells along each axis; see `grid_mesh`."""
+    return grid_mesh(
+        cell_type, [np.linspace(low, high, n + 1) for low, high, n in zip(lower, upper, counts, strict=True)]
+    )
+
+
+def grid_mesh(cell_type: str, axes: Sequence[np.ndarray]) -> Mesh:
+    """The box cut at ascending coordinates along each axis.
 
     Cells of triangles are cut along diagonals that alternate. The sides are boundaries, the whole is the zone "all".
     """
     linear = ELEMENTS[cell_type].linear or cell_type
-    axes = [np.linspace(low, high, n + 1) for low, high, n in zip(lower, upper, counts, strict=True)]
+    counts = [len(axis) - 1 for axis in axes]
     points = np.stack([x.ravel(order="F") for x in np.meshgrid(*axes, indexing="ij")], axis=1)
     cells = _CUTS[linear](_bricks(counts), counts)
     boundaries = {

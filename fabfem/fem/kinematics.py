@@ -5,6 +5,10 @@ displacement times one of the shape terms of a node (derivatives along the mesh 
 entry (i, j). The strain is ``-sym(H)``: compression positive, the only minus sign there is. Materials always see all
 six Mandel components; `active` names those that are not zero for every displacement.
 
+With `mean_dilation` the volume strain at a point is replaced by its mean over a patch of elements (B̄, Hughes 1980): the
+operator then has as many terms again, the patch means of the first, and the table is split by the volumetric projector.
+All three normal strains may then differ from zero, though a plane strain's mean out-of-plane strain does not.
+
 Axes: plane strain x, y (up), z out of plane; axisymmetric x = r, y = axial (up), z = θ; solids x, y, z (up).
 """
 
@@ -14,7 +18,7 @@ from functools import cached_property
 
 import numpy as np
 
-from umat.mandel import from_tensor
+from umat.mandel import SPHERICAL, from_tensor
 
 RADIAL = -1  # the shape term N/r; derivatives are 0, 1, 2
 
@@ -35,6 +39,8 @@ class Kinematics:
         Coordinates (n, dim) -> (nmodes, n, ncomp) motions without strain.
     axes : tuple of int
         Direction in space of each component.
+    mean_dilation : bool
+        Whether the volume strain is a mean over patches of elements instead of the point's own.
     """
 
     components: tuple[str, ...]
@@ -42,6 +48,7 @@ class Kinematics:
     terms: tuple[tuple[int, int, int, int, float], ...]
     modes: Callable[[np.ndarray], np.ndarray]
     axes: tuple[int, ...]
+    mean_dilation: bool = False
 
     @property
     def radial(self) -> bool:
@@ -50,13 +57,16 @@ class Kinematics:
 
     @cached_property
     def operator(self) -> np.ndarray:
-        """(6, ncomp, nterm) Mandel strain made by each component times each shape term of a node."""
+        """(6, ncomp, nterm) Mandel strain made by each component times each shape term of a node, or its patch mean."""
         operator = np.zeros((6, len(self.components), self.dim + self.radial))
         for component, term, i, j, factor in self.terms:
             gradient = np.zeros((3, 3))
             gradient[i, j] = factor
             operator[:, component, term] += from_tensor(-gradient)
-        return operator
+        if not self.mean_dilation:
+            return operator
+        dilation = np.tensordot(SPHERICAL, operator, axes=1)
+        return np.concatenate([operator - dilation, dilation], axis=2)
 
     @cached_property
     def active(self) -> np.ndarray:

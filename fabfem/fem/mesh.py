@@ -129,6 +129,17 @@ def outer_facets(cells: np.ndarray, cell_type: str, nodes: np.ndarray) -> np.nda
     return inside[count[key] == 1]
 
 
+def inner_facets(cells: np.ndarray, cell_type: str) -> tuple[np.ndarray, np.ndarray]:
+    """(n, 2) elements that share a facet, and (n, nfacetnode) its nodes."""
+    element = ELEMENTS[cell_type]
+    facets = _facets(cells, element)
+    corners = np.sort(facets[:, : _ncorner(element)], axis=1)
+    order = np.lexsort(corners.T)
+    twin = np.flatnonzero((corners[order[1:]] == corners[order[:-1]]).all(axis=1))
+    elements = np.stack([order[twin], order[twin + 1]], axis=1) // len(element.facets)
+    return np.sort(elements, axis=1), facets[order[twin]]
+
+
 def _read(path: Path) -> meshio.Mesh:
     """What meshio reads; its prints and its exit become one sentence."""
     if not path.is_file():
@@ -138,10 +149,19 @@ def _read(path: Path) -> meshio.Mesh:
     said = StringIO()
     try:
         with redirect_stdout(said), redirect_stderr(said):
-            return meshio.read(path)
+            return _middle_last(meshio.read(path), path)
     except (meshio.ReadError, LookupError, SystemExit, TypeError, ValueError) as error:
         reason = said.getvalue().partition("\n")[0] or str(error) or "unknown format"
         raise MeshError(f"{path.name} cannot be read as a mesh: {reason.rstrip('.')}.") from error
+
+
+def _middle_last(raw: meshio.Mesh, path: Path) -> meshio.Mesh:
+    """The mesh with the middle node of a line last: Abaqus numbers it along the line, and meshio leaves it there."""
+    if path.suffix.lower() == ".inp":
+        for block in raw.cells:
+            if block.type == "line3":
+                block.data = block.data[:, [0, 2, 1]]
+    return raw
 
 
 _ABAQUS = {

@@ -4,15 +4,16 @@ Newton sees the points only through `update_points` and `elastic_tangents`, the 
 the solver only through `linear`; each works on the elements of its space, be it all of them or one rank's.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from fabfem.fem.pores import PoreWater
 from fabfem.fem.space import Space
 from fabfem.fem.stages import Stage
-from umat import elastic_tangent, symmetric_tangent, update
+from umat import elastic_tangent, symmetric_tangent, update, weakened
 from umat.status import message
 
 States = dict[str, Any]
@@ -80,13 +81,14 @@ class Controls:
 
 @dataclass(frozen=True)
 class Model:
-    """Everything that `march` needs; `solver` is "auto", "superlu" or "pardiso"."""
+    """Everything that `march` needs; `solver` is "auto", "superlu" or "pardiso"; `water` needs a `PorousSpace`."""
 
     space: Space
     zones: Mapping[str, Zone]
     stages: tuple[Stage, ...]
     controls: Controls = field(default_factory=Controls)
     solver: str = "auto"
+    water: PoreWater | None = None
 
     def __post_init__(self) -> None:
         """Refuse zones that leave points out or share them."""
@@ -98,14 +100,28 @@ class Model:
             raise ValueError(f"element {element} belongs to {count[element * self.space.nq]} zones instead of one.")
 
     @property
-    def symmetric(self) -> bool:
-        """Whether the stiffness is symmetric whatever the points do."""
-        return all(symmetric_tangent(zone.material) for zone in self.zones.values())
-
-    @property
     def states(self) -> States:
         """Initial states by zone."""
         return {name: zone.state for name, zone in self.zones.items()}
+
+
+def symmetric(zones: Mapping[str, Zone]) -> bool:
+    """Whether the stiffness is symmetric whatever the points do."""
+    return all(symmetric_tangent(zone.material) for zone in zones.values())
+
+
+class Refused(NamedTuple):
+    """A point that its material refused, with all that its answer depends on."""
+
+    zone: str
+    point: int
+    material: Any
+    directions: Any
+    state: Any
+    """State of one point, before."""
+    strain_increment: np.ndarray
+    """(1, 6)"""
+    status: int
 
 
 class Refusal(NamedTuple):
@@ -113,6 +129,8 @@ class Refusal(NamedTuple):
 
     reason: str
     point: int = -1
+    refused: Refused | None = None
+    """The point alone, where a material refused it."""
 
 
 class Batch(NamedTuple):
@@ -126,6 +144,8 @@ class Batch(NamedTuple):
     worst_point: int
     """Point with the largest integration error."""
     worst_error: float
+    error: np.ndarray
+    """(npoints,) integration error of every point."""
     held: int
     """Points that keep their old stress and state."""
 
@@ -139,18 +159,23 @@ def update_points(
 ) -> Batch | Refusal:
     """The answer of all points to a strain increment (npoints, 6), or the first point that refused.
 
+    Points without a zone have no stress and no stiffness; states of other zones are handed on.
+
     `may_hold` is the share of all points that may refuse and are held instead.
     """
     npoints, held = len(strain_increment), 0
-    stress, tangent = np.empty((npoints, 6)), np.empty((npoints, 6, 6))
-    error, states = np.empty(npoints), {}
+    stress, tangent = np.zeros((npoints, 6)), np.zeros((npoints, 6, 6))
+    error, states = np.zeros(npoints), dict(old)
     for name, zone in zones.items():
         response = update(zone.material, zone.directions, strain_increment[zone.points], old[name])
         refused = np.flatnonzero(response.status)
         held += len(refused)
         if held > may_hold * npoints:
-            point = int(np.arange(npoints)[zone.points][refused[0]])
-            return Refusal(f"{len(refused)} points of zone '{name}': {message(response.status[refused[0]])}", point)
+            first = refused[:1]
+            point, code = int(np.arange(npoints)[zone.points][first[0]]), int(response.status[first[0]])
+            strain, state = strain_increment[zone.points][first], type(old[name])(*(part[first] for part in old[name]))
+            alone = Refused(name, point, zone.material, zone.directions, state, strain, code)
+            return Refusal(f"{len(refused)} points of zone '{name}': {message(code)}", point, alone)
         stress[zone.points], tangent[zone.points] = response.stress, response.tangent
         if len(refused):
             points = np.arange(npoints)[zone.points][refused]
@@ -159,20 +184,30 @@ def update_points(
     bad = np.flatnonzero(~(np.isfinite(stress).all(axis=1) & np.isfinite(tangent).all(axis=(1, 2))))
     if len(bad):
         return Refusal(f"{len(bad)} points have a stress or tangent that is not finite", int(bad[0]))
-    return Batch(stress, tangent, states, int(error.argmax()), float(error.max()), held)
+    return Batch(stress, tangent, states, int(error.argmax()), float(error.max()), error, held)
 
 
 def elastic_tangents(zones: Mapping[str, Zone], states: States, npoints: int) -> np.ndarray:
-    """(npoints, 6, 6) elastic tangents."""
-    tangent = np.empty((npoints, 6, 6))
+    """(npoints, 6, 6) elastic tangents; zero where there is no zone."""
+    tangent = np.zeros((npoints, 6, 6))
     for name, zone in zones.items():
         tangent[zone.points] = elastic_tangent(zone.material, states[name])
     return tangent
 
 
-def initial_stress(zones: Mapping[str, Zone], npoints: int) -> np.ndarray:
-    """(npoints, 6) stress of the initial states."""
-    stress = np.empty((npoints, 6))
-    for zone in zones.values():
-        stress[zone.points] = zone.state.stress
+def stress_of(zones: Mapping[str, Zone], states: States, npoints: int) -> np.ndarray:
+    """(npoints, 6) stress of the states; zero where there is no zone."""
+    stress = np.zeros((npoints, 6))
+    for name, zone in zones.items():
+        stress[zone.points] = states[name].stress
     return stress
+
+
+def weaken(zones: Mapping[str, Zone], factor: float, spared: Sequence[str] = ()) -> dict[str, Zone]:
+    """The zones with the strength of their materials divided by `factor`, except those `spared`."""
+    if factor == 1.0:
+        return dict(zones)
+    return {
+        name: zone if name in spared else zone._replace(material=weakened(zone.material, factor))
+        for name, zone in zones.items()
+    }

@@ -13,9 +13,10 @@ import numpy as np
 from scipy.sparse import csr_matrix
 
 from fabfem.fem.assembly import stiffness
+from fabfem.fem.diagnosis import singularity
 from fabfem.fem.linear import norm
 from fabfem.fem.model import Controls, Refusal, elastic_tangents
-from fabfem.fem.trial import Equilibrium, System, Task, Trial, attempt, make_task
+from fabfem.fem.trial import Equilibrium, System, Task, Trial, attempt, make_task, mechanical
 
 
 class Solved(NamedTuple):
@@ -44,18 +45,18 @@ def solve_increment(
         iterations += 1
     while isinstance(trial, Trial):
         residuals.append(trial.residual)
-        if trial.residual <= system.controls.tolerance or trial.norm <= _round_off(system, trial.step):
+        if trial.residual <= system.controls.tolerance or trial.norm <= round_off(system, trial.step):
             break
         if iterations == system.controls.max_iterations:
             reason = f"no equilibrium in {iterations} iterations (residual {trial.residual:.1e})"
-            trial = Refusal(reason, _worst_point(system, trial))
+            trial = Refusal(reason, worst_point(system, trial))
             break
         trial = _corrected(system, old, task, trial)
         iterations += 1
     return Solved(trial, iterations, tuple(residuals))
 
 
-def _round_off(system: System, step: np.ndarray) -> float:
+def round_off(system: System, step: np.ndarray) -> float:
     """The out-of-balance force that round-off alone makes; it matters where a body moves without strain."""
     return 1e-14 * system.stiffest * norm(step)
 
@@ -93,14 +94,12 @@ def _first_that_works(
 
 def _extended(system: System, old: Equilibrium, task: Task, tangent: np.ndarray) -> Trial | Refusal:
     """The trial of one linear step from `old` to the new load and held dofs."""
-    step = np.zeros(system.space.ndof)
-    step[system.constraints.held] = task.motion
-    matrix = _stiffness(system, task, tangent)
-    correction = _solved(system, matrix, (task.load - old.force - matrix @ step)[system.constraints.free])
+    matrix = stiffness_of(system, task, tangent)
+    start = old.force if task.start is None else task.start
+    correction = solved(system, matrix, system.constraints.collect(task.load - start - matrix @ task.motion))
     if isinstance(correction, Refusal):
         return correction
-    step[system.constraints.free] = correction
-    return attempt(system, old, task, step)
+    return attempt(system, old, task, task.motion + system.constraints.spread(correction))
 
 
 def _searched(system: System, old: Equilibrium, task: Task, trial: Trial, tangent: np.ndarray) -> Trial | Refusal:
@@ -108,22 +107,25 @@ def _searched(system: System, old: Equilibrium, task: Task, trial: Trial, tangen
 
     Where shortening does not end that, the trial with the smallest residual, unless it rises too much.
     """
-    correction = _solved(system, _stiffness(system, task, tangent), trial.unbalanced)
+    correction = solved(system, stiffness_of(system, task, tangent), trial.unbalanced)
     if isinstance(correction, Refusal):
         return correction
-    start = float((correction * trial.unbalanced).sum())
+    along = system.constraints.spread(correction)
+    start = _work(system, correction, trial.unbalanced)
     tried: list[Trial | Refusal] = []
     factor = 1.0
     for _ in range(system.controls.backtracks + 1):
-        step = trial.step.copy()
-        step[system.constraints.free] += factor * correction
-        new = attempt(system, old, task, step)
+        new = attempt(system, old, task, trial.step + factor * along)
         tried.append(new)
-        left = float((correction * new.unbalanced).sum()) if isinstance(new, Trial) else 0.0
+        left = _work(system, correction, new.unbalanced) if isinstance(new, Trial) else 0.0
         if isinstance(new, Trial) and _content(system.controls, new.norm / trial.norm, start, left):
             return new
         factor *= float(np.clip(start / (start - left), 0.1, 0.5)) if left < 0.0 < start else 0.5
     return _least(system, trial, tried)
+
+
+def _work(system: System, correction: np.ndarray, unbalanced: np.ndarray) -> float:
+    return float((mechanical(system, correction) * mechanical(system, unbalanced)).sum())
 
 
 def _content(controls: Controls, rise: float, start: float, left: float) -> bool:
@@ -140,25 +142,36 @@ def _least(system: System, trial: Trial, tried: list[Trial | Refusal]) -> Trial 
     best = min(trials, key=lambda new: new.norm)
     if best.norm < system.controls.rise * trial.norm:
         return best
-    return Refusal(f"every correction makes the residual {trial.residual:.1e} rise", _worst_point(system, trial))
+    return Refusal(f"every correction makes the residual {trial.residual:.1e} rise", worst_point(system, trial))
 
 
-def _stiffness(system: System, task: Task, tangent: np.ndarray) -> csr_matrix:
+def stiffness_of(system: System, task: Task, tangent: np.ndarray) -> csr_matrix:
+    """The (ndof, ndof) stiffness of a tangent (npoints, 6, 6) and of the viscosity of a task."""
     with system.timer.phase("assembly"):
         whole = tangent if task.viscous is None else tangent + task.viscous
-        return stiffness(system.space, system.pattern, whole)
+        matrix = stiffness(system.space, system.pattern, whole)
+        if task.wet is not None:
+            matrix.data += task.wet.data
+        return matrix
 
 
-def _solved(system: System, matrix: csr_matrix, rhs: np.ndarray) -> np.ndarray | Refusal:
+def solved(system: System, matrix: csr_matrix, rhs: np.ndarray) -> np.ndarray | Refusal:
+    """The unknowns that a force on them moves, under a stiffness (ndof, ndof), or why not."""
+    if not len(rhs):  # everything is held
+        return rhs
     with system.timer.phase("linear_solve"):
-        system.solver.factor(system.reduce(matrix))
+        reduced = system.reduce(matrix)
+        system.solver.factor(reduced)
         solution = system.solver.solve(rhs)
-    return solution.x if solution.ok else Refusal(solution.reason)
+        if solution.ok:
+            return solution.x
+        named = singularity(system, reduced)
+    return Refusal(named or solution.reason)
 
 
-def _worst_point(system: System, trial: Trial) -> int:
+def worst_point(system: System, trial: Trial) -> int:
     """A point of an element at the most unbalanced dof."""
     if not len(trial.unbalanced):
         return -1
-    dof = system.constraints.free[np.abs(trial.unbalanced).argmax()]
+    dof = np.abs(system.constraints.spread(trial.unbalanced)).argmax()
     return int(np.argmax((system.space.dofs == dof).any(axis=1))) * system.space.nq

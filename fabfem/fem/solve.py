@@ -1,105 +1,91 @@
 """The march through the stages: increments that grow, halve, are tried again, and give up at a stated size.
 
 `march` yields every converged increment. Where it cannot go on, its last item is a `Stopped` that says why and where;
-nothing is raised and nothing that converged is lost.
+nothing is raised and nothing that converged is lost. What drives a stage is chosen by the type of its goal (`COURSES`):
+without one, the fraction of its loads and motions.
 """
 
-from collections.abc import Callable, Generator, Iterator
-from dataclasses import dataclass
+from collections.abc import Generator, Iterator, Mapping
+from importlib import import_module
 from typing import NamedTuple
 
 import numpy as np
 
 from fabfem.fem.assembly import Pattern, find_pattern, stiffness
-from fabfem.fem.linear import make_solver, norm
-from fabfem.fem.loads import external_force
-from fabfem.fem.model import Controls, Model, Refusal, States, elastic_tangents, initial_stress
-from fabfem.fem.newton import Solved, solve_increment
+from fabfem.fem.increment import (
+    Collapsed,
+    Cutback,
+    Factor,
+    Increment,
+    Place,
+    Step,
+    Stopped,
+    advanced,
+    increment,
+)
+from fabfem.fem.linear import make_solver
+from fabfem.fem.loads import Loading, loading
+from fabfem.fem.model import Controls, Model, Refusal, Zone, elastic_tangents, stress_of, symmetric, weaken
+from fabfem.fem.newton import solve_increment
+from fabfem.fem.pores import Flowed, Pace, PorousSpace, Water, water_of
+from fabfem.fem.reduction import reduction
 from fabfem.fem.space import Space
-from fabfem.fem.stages import Stage
-from fabfem.fem.supports import constrain, reduction
-from fabfem.fem.trial import PHASES, Equilibrium, System, Trial, relative
+from fabfem.fem.stages import ArcLength, DisplacementControl, Stage, StrengthSearch
+from fabfem.fem.start import Start, misfit
+from fabfem.fem.supports import constrain
+from fabfem.fem.trial import PHASES, Equilibrium, System, Trial
 from fabfem.timing import Timer
 
+__all__ = ["Collapsed", "Cutback", "Factor", "Increment", "Start", "Stopped", "march", "reaction", "systems_of"]
 
-@dataclass(frozen=True)
-class Cutback:
-    """An increment that was refused and tried again smaller."""
+COURSES = {
+    StrengthSearch: "fabfem.fem.safety",
+    DisplacementControl: "fabfem.fem.follow",
+    ArcLength: "fabfem.fem.follow",
+}
+"""Module whose `through` goes through a stage with such a goal."""
 
-    stage: str
+TOO_FAST = 4.0
+"""Error of a time step, over what the stage allows, at which it is done again."""
+
+Course = Generator[Increment | Stopped | Collapsed, None, tuple[Equilibrium | None, int]]
+
+
+class Progress(NamedTuple):
+    """What a stage without a goal has come to."""
+
     fraction: float
-    """Fraction of the stage that it started from."""
     size: float
-    """Its size, as a fraction of the stage."""
-    reason: str
-    point: int
-    """Worst point, -1 where no point is to blame."""
+    """Size to try next."""
+    guess: np.ndarray | None = None
+    """(ndof,) displacement increment to start from."""
+    flowed: Flowed = Flowed()
 
 
-@dataclass(frozen=True)
-class Increment:
-    """A converged increment."""
-
-    stage: str
-    stage_index: int
-    number: int
-    """Counted from 1 through the run."""
-    fraction: float
-    """Fraction of the stage that is done, 0…1."""
-    size: float
-    time: float
-    displacement: np.ndarray
-    """(ndof,) since displacements were last set to zero."""
-    states: States
-    """State of each zone."""
-    internal_force: np.ndarray
-    """(ndof,) nodal forces of the stress, drag included."""
-    external_force: np.ndarray
-    """(ndof,) nodal forces of the loads."""
-    iterations: int
-    """Linear solves."""
-    residuals: tuple[float, ...]
-    """Relative residual of every trial."""
-    out_of_balance: float
-    """Relative residual under the new loads before anything moved."""
-    drag: float
-    """Norm of the nodal forces of the viscous stress, relative as the residual is; 0 without viscosity."""
-    held: int
-    """Points that kept their old stress and state because the material refused them; see `Controls`."""
-    moved: float
-    """Largest displacement of a node in this increment."""
-    cutbacks: tuple[Cutback, ...]
-    worst_point: int
-    """Point with the largest integration error, and the error."""
-    worst_error: float
-    timings: dict[str, float]
-    """Seconds spent in material, assembly, linear_solve, tries that failed included."""
-
-
-@dataclass(frozen=True)
-class Stopped:
-    """Why a run could not go on after its last increment."""
-
-    stage: str
-    stage_index: int
-    fraction: float
-    reason: str
-    point: int
-    cutbacks: tuple[Cutback, ...]
-    timings: dict[str, float]
-    """Seconds spent in each phase on the tries that failed."""
-
-
-def march(model: Model) -> Iterator[Increment | Stopped]:
+def march(model: Model, start: Start | None = None) -> Iterator[Increment | Stopped | Collapsed]:
     """Iterate over the converged increments of all stages; a `Stopped` ends a run that cannot go on.
 
-    Raises ValueError where a stage is impossible.
+    A `Collapsed` ends a stage that searched for the factor of safety, and the run with it. With `start`, the `resume`
+    of an increment of an earlier march, it goes on after that increment, to the last bit as that march did. Raises
+    ValueError where a stage is impossible or `start` does not fit the model.
     """
+    if start is not None and (why := misfit(model, start)):
+        raise ValueError(f"the march cannot be taken up at this start: {why}.")
+    return _all_stages(model, systems_of(model), start)
+
+
+def systems_of(model: Model) -> list[System]:
+    """The equations of every stage; raises ValueError where a stage is impossible."""
     space = model.space
     pattern = find_pattern(space.dofs, space.ndof)
     elastic = stiffness(space, pattern, elastic_tangents(model.zones, model.states, space.npoints))
     shared = (pattern, Timer(PHASES), float(np.abs(elastic.diagonal()).max()))
-    return _all_stages(model, [_system(model, stage, *shared) for stage in model.stages])
+    zones: Mapping[str, Zone] = model.zones
+    systems: list[System] = []
+    for stage in model.stages:
+        zones = changed(zones, stage)
+        systems.append(_system(model, stage, zones, *shared))
+    return systems
 
 
 def reaction(space: Space, increment: Increment, boundary: str, component: str) -> float:
@@ -108,138 +94,158 @@ def reaction(space: Space, increment: Increment, boundary: str, component: str) 
     return float((increment.internal_force - increment.external_force)[dofs].sum())
 
 
-def _system(model: Model, stage: Stage, pattern: Pattern, timer: Timer, stiffest: float) -> System:
-    constraints = constrain(model.space, stage.supports)
+def changed(zones: Mapping[str, Zone], stage: Stage) -> dict[str, Zone]:
+    """All zones with the materials that a stage gives them; raises ValueError for zones that there are not."""
+    for name in (*stage.absent, *stage.changes, *stage.spared):
+        if name not in zones:
+            raise ValueError(f"stage '{stage.name}' names a zone '{name}' that the model does not have.")
+    new = {
+        name: zones[name]._replace(material=change.material, directions=change.directions)
+        for name, change in stage.changes.items()
+    }
+    return {**zones, **new}
+
+
+def absent_dofs(space: Space, absent: Mapping[str, Zone]) -> np.ndarray:
+    """Dofs of nodes that only elements of absent zones have."""
+    there = np.ones(space.npoints, bool)
+    for zone in absent.values():
+        there[zone.points] = False
+    kept = np.zeros(space.ndof, bool)
+    kept[space.dofs[there.reshape(-1, space.nq).any(axis=1)]] = True
+    return np.flatnonzero(~kept)
+
+
+def _system(
+    model: Model, stage: Stage, zones: Mapping[str, Zone], pattern: Pattern, timer: Timer, stiffest: float
+) -> System:
+    gone = absent_dofs(model.space, {name: zones[name] for name in stage.absent})
+    water = _water(model, stage, pattern)
+    if isinstance(model.space, PorousSpace) and water is None:
+        gone = np.union1d(gone, np.arange(model.space.nmotion, model.space.ndof))
+    constraints = constrain(model.space, stage.supports, stage.bodies, gone)
     reduce = reduction(pattern, constraints)
-    solver = make_solver(model.solver, model.symmetric)
-    return System(model.space, model.zones, model.controls, constraints, pattern, reduce, solver, timer, stiffest)
+    there = {name: zone for name, zone in zones.items() if name not in stage.absent}
+    if not isinstance(stage.goal, StrengthSearch):
+        there = weaken(there, stage.strength, stage.spared)
+    solver = make_solver(model.solver, symmetric(there))
+    return System(model.space, there, model.controls, constraints, pattern, reduce, solver, timer, stiffest, water)
 
 
-def _all_stages(model: Model, systems: list[System]) -> Iterator[Increment | Stopped]:
+def _water(model: Model, stage: Stage, pattern: Pattern) -> Water | None:
+    """What pore water does in a stage; None where there is none, or its excess pressure is zero."""
+    if model.water is None or not isinstance(model.space, PorousSpace) or stage.drainage == "drained":
+        return None
+    return water_of(model.space, pattern, model.water, stage.drainage == "seepage", stage.duration)
+
+
+def _all_stages(model: Model, systems: list[System], start: Start | None) -> Iterator[Increment | Stopped | Collapsed]:
     space = model.space
-    force = space.internal_force(initial_stress(model.zones, space.npoints))
-    now = Equilibrium(np.zeros(space.ndof), model.states, force, np.zeros((0, 6, 6)))
-    number, time = 0, 0.0
-    for index, (stage, system) in enumerate(zip(model.stages, systems, strict=True)):
-        now = now._replace(tangent=elastic_tangents(model.zones, now.states, space.npoints))
-        place = _Place(stage, index, number, time)
-        reached, number = yield from _through(place, system, now)
+    now = Equilibrium(np.zeros(space.ndof), model.states, np.zeros(space.ndof), np.zeros((0, 6, 6)))
+    number, time = (start.number, start.time) if start else (0, 0.0)
+    done = start.stage_index if start else 0
+    for index, (stage, system) in enumerate(zip(model.stages[done:], systems[done:], strict=True), done):
+        if start and index == done:
+            now, place = start.now, Place(stage, index, number, time, start.origin, start.progress)
+        else:
+            try:
+                now = _begun(now, stage, system)
+            except ValueError as error:
+                yield Stopped(stage.name, index, 0.0, f"a zone cannot change its material: {error}", -1, (), {})
+                return
+            place = Place(stage, index, number, time, now.force)
+        reached, number = yield from _course(place, system, now)
         if reached is None:
             return
         now = reached
         if stage.zero_displacement:
-            now = now._replace(displacement=np.zeros(space.ndof))
+            now = now._replace(displacement=space.at_rest(now.displacement))
         time += stage.duration
 
 
-class _Place(NamedTuple):
-    """A stage, and the increments and time before it."""
-
-    stage: Stage
-    stage_index: int
-    number: int
-    time: float
-
-
-class _Step(NamedTuple):
-    """An increment with all its tries."""
-
-    solved: Solved
-    fraction: float
-    size: float
-    load: np.ndarray
-    cutbacks: tuple[Cutback, ...]
+def _begun(now: Equilibrium, stage: Stage, system: System) -> Equilibrium:
+    """The state in which a stage begins: materials changed, forces those of the zones that are there."""
+    states = now.states | {name: change.begin(now.states[name]) for name, change in stage.changes.items()}
+    npoints = system.space.npoints
+    force = system.space.internal_force(stress_of(system.zones, states, npoints))
+    return Equilibrium(now.displacement, states, force, elastic_tangents(system.zones, states, npoints))
 
 
-def _through(
-    place: _Place, system: System, now: Equilibrium
-) -> Generator[Increment | Stopped, None, tuple[Equilibrium | None, int]]:
+def _course(place: Place, system: System, now: Equilibrium) -> Course:
+    """The way through a stage that its goal asks for."""
+    load = loading(system.space, place.stage.loads)
+    if place.stage.released:
+        load = load.released(system.constraints.keep_unknown(place.origin - load.total(0.0)))
+    if place.stage.goal is None:
+        return _through(place, system, now, load)
+    return import_module(COURSES[type(place.stage.goal)]).through(place, system, now, load)
+
+
+def _through(place: Place, system: System, now: Equilibrium, load: Loading) -> Course:
     """Yield the increments of a stage; return its last equilibrium, None where it stopped, and their number so far."""
-    stage, fraction, size, number = place.stage, 0.0, place.stage.first, place.number
-    load, guess = external_force(system.space, stage.loads), None
-    while fraction < 1.0:
+    stage, number = place.stage, place.number
+    pace, at = Pace(system.water, stage.time_tolerance), place.progress or Progress(0.0, stage.first)
+    while at.fraction < 1.0:
         spent = dict(system.timer.spent)
-        step = _tried(stage, system, load, now, fraction, size, guess)
+        step = _tried(stage, system, load, now, at, pace)
         trial = step.solved.end
         if isinstance(trial, Refusal):
             timings = system.timer.since(spent)
-            yield Stopped(stage.name, place.stage_index, fraction, *trial, step.cutbacks, timings)
+            yield Stopped(stage.name, place.stage_index, at.fraction, trial.reason, trial.point, step.cutbacks, timings)
             return None, number
-        number, fraction, old = number + 1, step.fraction, now
-        now = Equilibrium(
-            old.displacement + trial.step, trial.batch.states, trial.force - trial.drag, trial.batch.tangent
-        )
-        yield _increment(place, number, system, old, now, step, trial, system.timer.since(spent))
-        size = _next_size(stage, system.controls, step)
-        guess = _extrapolated(system, trial.step, step.size, min(size, 1.0 - fraction))
+        number, old = number + 1, now
+        now, at = advanced(old, trial), _gone_on(stage, system, at, old, step, trial, pace)
+        yield increment(place, number, system, old, now, step, trial, system.timer.since(spent), at)
     return now, number
 
 
-def _tried(
-    stage: Stage,
-    system: System,
-    load: Callable[[float], np.ndarray],
-    now: Equilibrium,
-    fraction: float,
-    size: float,
-    guess: np.ndarray | None,
-) -> _Step:
-    """The increment after `fraction`, made smaller until it converges or its size is below the stage's smallest."""
+def _gone_on(
+    stage: Stage, system: System, at: Progress, old: Equilibrium, step: Step, trial: Trial, pace: Pace
+) -> Progress:
+    """What the stage has come to after an increment from `old`."""
+    last = old.displacement, trial.step, step.size
+    size = _next_size(stage, system.controls, step, pace.error(at.flowed, *last))
+    guess = _extrapolated(system, trial.step, step.size, min(size, 1.0 - step.fraction))
+    return Progress(step.fraction, size, guess, pace.after(at.flowed, *last))
+
+
+def _tried(stage: Stage, system: System, load: Loading, now: Equilibrium, at: Progress, pace: Pace) -> Step:
+    """The next increment, made smaller until it converges or its size is below the stage's smallest."""
     cutbacks: tuple[Cutback, ...] = ()
+    fraction, size, guess, flowed = at
+    end = next(mark for mark in stage.marks if mark > fraction + 1e-9)
     while True:
-        target = fraction + size if fraction + 1.001 * size < 1.0 else 1.0
+        target = fraction + size if fraction + 1.001 * size < end else end
         size = target - fraction
-        forces = load(target)
+        forces = load.total(target)
         solved = solve_increment(system, now, forces, size, guess)
-        if isinstance(solved.end, Trial):
-            return _Step(solved, target, size, forces, cutbacks)
-        cutbacks += (Cutback(stage.name, fraction, size, *solved.end),)
+        answer = solved.end
+        may_shrink = 0.5 * size >= stage.smallest
+        if (
+            isinstance(answer, Trial)
+            and may_shrink
+            and pace.error(flowed, now.displacement, answer.step, size) > TOO_FAST
+        ):
+            answer = Refusal("the pore pressure changes faster than the time step can follow")
+        if isinstance(answer, Trial):
+            return Step(solved, target, size, forces, load.on_soil(target), cutbacks)
+        cutbacks += (Cutback(stage.name, fraction, size, *answer, solved.residuals),)
         size, guess = 0.5 * size, None
         if size < stage.smallest:
-            return _Step(solved, target, size, forces, cutbacks)
+            return Step(solved._replace(end=answer), target, size, forces, forces, cutbacks)
 
 
-def _next_size(stage: Stage, controls: Controls, step: _Step) -> float:
-    """The size to try next: larger after an easy increment that needed no cut-back."""
+def _next_size(stage: Stage, controls: Controls, step: Step, pace: float) -> float:
+    """The size to try next: larger after an easy increment without cut-back, as far as the flow of water allows."""
     easy = step.solved.iterations <= controls.easy and not step.cutbacks
-    return min(step.size * (controls.growth if easy else 1.0), stage.largest)
+    growth = controls.growth if easy else 1.0
+    if pace > 0.0:
+        growth = float(np.clip(0.9 * pace**-0.5, 0.3, growth))
+    return float(np.clip(step.size * growth, stage.smallest, stage.largest))
 
 
 def _extrapolated(system: System, last: np.ndarray, last_size: float, size: float) -> np.ndarray | None:
     """The last displacement increment carried on to the next size, where the controls ask for that."""
+    if system.water is not None:  # a drain lets pressures fall in one step only
+        return None
     return last * (size / last_size) if system.controls.extrapolate else None
-
-
-def _increment(
-    place: _Place,
-    number: int,
-    system: System,
-    old: Equilibrium,
-    now: Equilibrium,
-    step: _Step,
-    trial: Trial,
-    timings: dict[str, float],
-) -> Increment:
-    start = norm((step.load - old.force)[system.constraints.free])
-    return Increment(
-        stage=place.stage.name,
-        stage_index=place.stage_index,
-        number=number,
-        fraction=step.fraction,
-        size=step.size,
-        time=place.time + step.fraction * place.stage.duration,
-        displacement=now.displacement,
-        states=now.states,
-        internal_force=trial.force,
-        external_force=step.load,
-        iterations=step.solved.iterations,
-        residuals=step.solved.residuals,
-        out_of_balance=relative(start, old.force, step.load),
-        drag=relative(norm(trial.drag), trial.force, step.load),
-        held=trial.batch.held,
-        moved=float(np.linalg.norm(system.space.displacement(trial.step), axis=1).max()),
-        cutbacks=step.cutbacks,
-        worst_point=trial.batch.worst_point,
-        worst_error=trial.batch.worst_error,
-        timings=timings,
-    )

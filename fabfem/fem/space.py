@@ -13,6 +13,7 @@ import numpy as np
 from fabfem.fem.elements import ELEMENTS, quadrature, shape
 from fabfem.fem.kinematics import Kinematics
 from fabfem.fem.mesh import Mesh
+from fabfem.fem.patches import patches, widened
 
 
 @dataclass(frozen=True)
@@ -24,10 +25,12 @@ class Space:
     mesh : Mesh
     kinematics : Kinematics
     dofs : (nel, nnode*ncomp) int32 array
+        Those that an element's strain depends on; with a mean dilation those of its whole patch, the element's first.
     values : (nq, nnode) array
         Shape functions at the points of the reference element.
     terms : (nel, nq, nnode, nterm) array
-        Shape terms: derivatives along the mesh axes, then N/r where there is an axis.
+        Shape terms: derivatives along the mesh axes, then N/r where there is an axis; with a mean dilation followed by
+        their means over the patch.
     weights : (npoints,) array
         Volume of each point, per unit thickness in plane strain, all around the axis in axisymmetry.
     points : (npoints, dim) array
@@ -102,6 +105,10 @@ class Space:
         full[:, self.kinematics.axes] = u.reshape(len(full), -1)
         return full
 
+    def at_rest(self, u: np.ndarray) -> np.ndarray:
+        """The unknowns with the displacement set to zero."""
+        return np.zeros_like(u)
+
     def cell_mean(self, values: np.ndarray) -> np.ndarray:
         """(nel, ...) volume means of point values (npoints, ...)."""
         weights = self.weights.reshape(-1, self.nq)
@@ -118,6 +125,17 @@ class Space:
         for k in range(total.shape[1]):
             total[:, k] = np.bincount(cells.ravel(), (fitted[:, :, k] * volume[:, None]).ravel(), len(total)) / share
         return total.reshape(len(total), *values.shape[1:])
+
+    def nodal_within(self, values: np.ndarray) -> np.ndarray:
+        """(nnodes,) smoothed values, none beyond the range of the points in the elements around the node.
+
+        A linear fit reaches beyond the points: near a footing's edge a mean stress becomes negative, a void ratio huge.
+        """
+        cells, by_cell = self.mesh.cells, values.reshape(-1, self.nq)
+        least, most = np.full(len(self.mesh.points), np.inf), np.full(len(self.mesh.points), -np.inf)
+        np.minimum.at(least, cells, by_cell.min(axis=1)[:, None])
+        np.maximum.at(most, cells, by_cell.max(axis=1)[:, None])
+        return np.clip(self.nodal(values), least, most)
 
     @cached_property
     def _to_nodes(self) -> np.ndarray:
@@ -145,10 +163,23 @@ def build_space(mesh: Mesh, kinematics: Kinematics, points: int | None = None) -
         radius = _radius(places)
         terms = np.concatenate([terms, (values / radius[:, :, None])[..., None]], axis=3)
         weights = weights * 2.0 * np.pi * radius
+    supporting = mesh.cells
+    if kinematics.mean_dilation:
+        supporting, terms = _with_means(mesh, terms, weights)
     return Space(
-        *(mesh, kinematics, _dofs(mesh.cells, len(kinematics.components)), values, np.ascontiguousarray(terms)),
+        *(mesh, kinematics, _dofs(supporting, len(kinematics.components)), values, np.ascontiguousarray(terms)),
         *(weights.ravel(), places.reshape(-1, mesh.dim), where),
     )
+
+
+def _with_means(mesh: Mesh, terms: np.ndarray, weights: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The nodes of each element's patch, and the terms (nel, nq, nnode, nterm) there followed by their patch means."""
+    own = np.einsum("eqat,eq->eat", terms, weights)
+    nodes, means = widened(mesh.cells, patches(mesh), own, weights.sum(axis=1))
+    wide = np.zeros((*terms.shape[:2], nodes.shape[1], 2 * terms.shape[3]))
+    wide[:, :, : terms.shape[2], : terms.shape[3]] = terms
+    wide[..., terms.shape[3] :] = means[:, None]
+    return nodes, wide
 
 
 def _radius(places: np.ndarray) -> np.ndarray:

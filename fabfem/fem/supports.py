@@ -1,21 +1,39 @@
-"""What is held: displacement components of boundaries, fixed or moved by a ramp.
+"""What is held or tied: displacement components of boundaries, fixed or moved by a ramp, and rigid bodies.
 
-A rigid rough footing is two supports on one boundary (both components), a smooth one only the normal component.
+The nodal displacements of a stage are u = T v + f g: v the unknowns, g the motion over the whole stage, f the part of
+the stage that has passed. A free dof is its own unknown. A held dof has none. The tied dofs of a rigid body follow the
+body's rigid motions, u = R q, R from `kinematics.modes` about the body's point; what is prescribed of q, and what other
+supports hold of the tied dofs, are linear equations for q, whose solutions q = q0 f + N w leave the unknowns w. So a
+node on a plane of symmetry needs no special case. Equilibrium is then Tᵀ (load - force) = 0: of the tied dofs only the
+resultants conjugate to the free motions of the body are in balance.
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
-from scipy.sparse import csr_matrix
+from scipy.sparse import block_diag
 
-from fabfem.fem.assembly import Pattern
 from fabfem.fem.space import Space
+
+MOTIONS = {
+    ("x", "y"): ("x", "y", "rotation"),
+    ("r", "z"): ("z",),
+    ("r", "z", "theta"): ("z", "rotation"),
+    ("x", "y", "z"): ("x", "y", "z", "rotation_z", "rotation_x", "rotation_y"),
+}
+"""Names of the rigid motions of a body by the displacement components of the scene, as `kinematics.modes` orders them;
+a rotation is counter-clockwise [rad]."""
+EXACT = 1e-9
+"""Relative size below which a singular value or the misfit of an equation is round-off."""
 
 
 @dataclass(frozen=True)
 class Support:
-    """One held component of a boundary; `displacement` [length] is added in equal parts over the stage."""
+    """One held component of a boundary; `displacement` [length] is added in equal parts over the stage.
+
+    A held pore pressure takes the value `displacement` [stress] at once: there the water drains.
+    """
 
     boundary: str
     component: str
@@ -23,29 +41,92 @@ class Support:
 
 
 @dataclass(frozen=True)
-class Constraints:
-    """Held dofs of a stage.
+class RigidBody:
+    """A rigid body on a boundary, such as a footing or a platen.
 
     Attributes
     ----------
-    held : (m,) array
-        Dofs, ascending.
-    motion : (m,) array
-        What each moves over the whole stage.
-    free : (ndof - m,) array
-        The other dofs.
+    boundary : str
+    ties : tuple of str
+        Components in which the nodes follow the body: all for a rough one, that across the boundary for a smooth one.
+    point : tuple of float
+        What rotations turn about and forces act at.
+    motion : mapping of str to float
+        Motions (`MOTIONS`) added in equal parts over the stage; what it does not name is free.
     """
 
-    held: np.ndarray
-    motion: np.ndarray
+    boundary: str
+    ties: tuple[str, ...]
+    point: tuple[float, ...]
+    motion: Mapping[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Constraints:
+    """The dofs of a stage, u = T v + f g.
+
+    Attributes
+    ----------
+    free : (m,) array
+        Dofs that are unknowns themselves, ascending.
+    motion : (ndof,) array
+        What the others move over the whole stage (g).
+    tied : (k,) array
+        Dofs that follow the free motions of rigid bodies, ascending.
+    ties : (k, n) array
+        How (the part of T that is not the identity).
+    """
+
     free: np.ndarray
+    motion: np.ndarray
+    tied: np.ndarray
+    ties: np.ndarray
+
+    def spread(self, unknowns: np.ndarray) -> np.ndarray:
+        """The (ndof,) displacement T v."""
+        whole = np.zeros(len(self.motion))
+        whole[self.free] = unknowns[: len(self.free)]
+        if len(self.tied):
+            whole[self.tied] = self.ties @ unknowns[len(self.free) :]
+        return whole
+
+    def collect(self, force: np.ndarray) -> np.ndarray:
+        """The force Tᵀ f on the unknowns."""
+        if not len(self.tied):
+            return force[self.free]
+        return np.concatenate([force[self.free], self.ties.T @ force[self.tied]])
+
+    def keep_unknown(self, force: np.ndarray) -> np.ndarray:
+        """The (ndof,) force without its part on dofs that are no unknowns."""
+        kept = np.zeros(len(force))
+        for dofs in (self.free, self.tied):
+            kept[dofs] = force[dofs]
+        return kept
 
 
-def constrain(space: Space, supports: Sequence[Support]) -> Constraints:
-    """The held dofs of `supports`.
+def constrain(
+    space: Space, supports: Sequence[Support], bodies: Sequence[RigidBody] = (), absent: np.ndarray | None = None
+) -> Constraints:
+    """The constraints that `supports`, `bodies` and the dofs without an element, `absent`, make.
 
-    Raises ValueError where two supports contradict each other or the body can still move as a rigid one.
+    Raises ValueError where they contradict each other or the whole can still move as a rigid body.
     """
+    absent = np.zeros(0, int) if absent is None else absent
+    moved = _moved(space, supports)
+    motion = np.zeros(space.ndof)
+    motion[list(moved)] = list(moved.values())
+    motion[absent] = 0.0
+    follows = [_follow(space, body, moved, absent, motion) for body in bodies]
+    tied, ties = _joined(follows)
+    fixed = np.concatenate([np.array(list(moved), dtype=int), absent, tied])
+    free = np.setdiff1d(np.arange(space.ndof), fixed)
+    constraints = Constraints(free, motion, tied, ties)
+    _refuse_rigid_motion(space, constraints, absent)
+    return constraints
+
+
+def _moved(space: Space, supports: Sequence[Support]) -> dict[int, float]:
+    """The held dofs and what each moves."""
     moved: dict[int, float] = {}
     for support in supports:
         for dof in space.dofs_on(support.boundary, support.component).tolist():
@@ -54,43 +135,87 @@ def constrain(space: Space, supports: Sequence[Support]) -> Constraints:
                     f"boundary '{support.boundary}' moves {support.component} by {support.displacement:g}, "
                     f"but a node of it is already moved by {moved[dof]:g} by another support."
                 )
-    held = np.array(sorted(moved), dtype=int)
-    _refuse_rigid_motion(space, held)
-    free = np.setdiff1d(np.arange(space.ndof), held)
-    return Constraints(held, np.array([moved[dof] for dof in held]), free)
+    return moved
 
 
-def _refuse_rigid_motion(space: Space, held: np.ndarray) -> None:
+def _joined(follows: Sequence[tuple[np.ndarray, np.ndarray]]) -> tuple[np.ndarray, np.ndarray]:
+    """The tied dofs of all bodies, ascending, and the blocks of how they follow as one array."""
+    tied = np.concatenate([np.zeros(0, int), *(dofs for dofs, _ in follows)])
+    if len(np.unique(tied)) < len(tied):
+        raise ValueError("two rigid bodies share a node; leave a gap between their boundaries.")
+    ties = block_diag([part for _, part in follows]).toarray() if follows else np.zeros((0, 0))
+    order = np.argsort(tied)
+    return tied[order], ties[order]
+
+
+def body_modes(space: Space, body: RigidBody) -> tuple[np.ndarray, np.ndarray]:
+    """The tied dofs (k,) of a body and how each follows its rigid motions (k, nmotion)."""
+    dofs = np.sort(np.concatenate([space.dofs_on(body.boundary, component) for component in body.ties]))
+    nodes, ncomp = dofs // len(space.components), len(space.components)
+    if len(body.point) != space.mesh.dim:
+        raise ValueError(f"the point of a rigid body has {space.mesh.dim} coordinates, not {len(body.point)}.")
+    arm = space.mesh.points[nodes] - np.asarray(body.point) * (not space.kinematics.radial)
+    modes = space.kinematics.modes(arm)
+    return dofs, modes[:, np.arange(len(dofs)), dofs % ncomp].T
+
+
+def _follow(
+    space: Space, body: RigidBody, moved: Mapping[int, float], absent: np.ndarray, motion: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """The tied dofs of a body that are not held and how they follow its free motions; the rest goes to `motion`.
+
+    Dofs that the body cannot move at all count as tied, to nothing.
+    """
+    dofs, modes = body_modes(space, body)
+    there = ~np.isin(dofs, absent)
+    dofs, modes = dofs[there], modes[there]
+    names = MOTIONS[space.components]
+    for name in body.motion:
+        if name not in names:
+            raise ValueError(f"a rigid body has no motion '{name}' here; it has {', '.join(names)}.")
+    also_held = np.array([dof in moved for dof in dofs.tolist()])
+    asked = np.array([names.index(name) for name in body.motion], dtype=int)
+    equations = np.concatenate([modes[also_held], np.eye(len(names))[asked]])
+    values = np.array([*(moved[dof] for dof in dofs[also_held].tolist()), *body.motion.values()])
+    given, loose = _solutions(equations, values, body)
+    dofs, modes = dofs[~also_held], modes[~also_held]
+    motion[dofs] = modes @ given
+    ties = modes @ loose
+    moving = np.linalg.norm(ties, axis=0) > EXACT * max(1.0, float(np.abs(modes).max(initial=0.0)))
+    return dofs, ties[:, moving]
+
+
+def _solutions(equations: np.ndarray, values: np.ndarray, body: RigidBody) -> tuple[np.ndarray, np.ndarray]:
+    """A solution (n,) of equations (m, n) and a basis (n, k) of what may be added to it."""
+    n = equations.shape[1]
+    if not len(equations):
+        return np.zeros(n), np.eye(n)
+    given = np.linalg.lstsq(equations, values, rcond=EXACT)[0]
+    if np.abs(equations @ given - values).max() > EXACT * max(np.abs(values).max(), 1e-300):
+        raise ValueError(
+            f"the rigid body on boundary '{body.boundary}' is to move in a way that another support forbids."
+        )
+    _, sizes, rows = np.linalg.svd(equations)
+    rank = int((sizes > EXACT * sizes[0]).sum()) if sizes[0] > 0.0 else 0
+    return given, rows[rank:].T
+
+
+def _refuse_rigid_motion(space: Space, constraints: Constraints, absent: np.ndarray) -> None:
+    """Raise where a rigid motion of all that is there is one that the constraints allow."""
     points = space.mesh.points
     size = float(np.ptp(points, axis=0).max())
     centred = (points - points.mean(axis=0) * (not space.kinematics.radial)) / size
-    modes = space.kinematics.modes(centred).reshape(-1, space.ndof)
-    loose = len(modes) - (np.linalg.matrix_rank(modes[:, held], tol=1e-9) if len(held) else 0)
+    modes = space.kinematics.modes(centred).reshape(-1, len(points) * len(space.components))
+    modes = np.pad(modes, ((0, 0), (0, space.ndof - modes.shape[1])))
+    allowed = np.concatenate([constraints.free, absent])
+    against = modes.copy()
+    against[:, allowed] = 0.0
+    if constraints.ties.shape[1]:
+        part = modes[:, constraints.tied].T
+        fitted = constraints.ties @ np.linalg.lstsq(constraints.ties, part, rcond=EXACT)[0]
+        against[:, constraints.tied] = (part - fitted).T
+    against[np.abs(against) < EXACT] = 0.0
+    loose = len(modes) - (np.linalg.matrix_rank(against, tol=EXACT) if against.any() else 0)
     if loose:
         motions = "one rigid motion" if loose == 1 else f"{loose} rigid motions"
         raise ValueError(f"the supports leave {motions} of the body free; hold more components.")
-
-
-@dataclass(frozen=True)
-class Reduction:
-    """The free-free block of a matrix of known pattern, itself of one fixed pattern."""
-
-    pattern: Pattern
-    keep: np.ndarray
-
-    def __call__(self, matrix: csr_matrix) -> csr_matrix:
-        """The block of `matrix`."""
-        return self.pattern.matrix(matrix.data[self.keep])
-
-
-def reduction(pattern: Pattern, constraints: Constraints) -> Reduction:
-    """How to cut the free-free block out of matrices of `pattern`."""
-    ndof = len(pattern.indptr) - 1
-    number = np.full(ndof, -1, np.int32)
-    number[constraints.free] = np.arange(len(constraints.free), dtype=np.int32)
-    rows = np.repeat(number, np.diff(pattern.indptr))
-    columns = number[pattern.indices]
-    keep = np.flatnonzero((rows >= 0) & (columns >= 0))
-    counts = np.bincount(rows[keep], minlength=len(constraints.free))
-    indptr = np.concatenate([[0], np.cumsum(counts)]).astype(np.int32)
-    return Reduction(Pattern(indptr, columns[keep], np.zeros((0, 0, 0), np.int32)), keep)

@@ -8,12 +8,15 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
+from scipy.sparse import csr_matrix
 
 from fabfem.fem.assembly import Pattern
 from fabfem.fem.linear import LinearSolver, norm
 from fabfem.fem.model import Batch, Controls, Refusal, States, Zone, elastic_tangents, update_points
+from fabfem.fem.pores import Water
+from fabfem.fem.reduction import Reduction
 from fabfem.fem.space import Space
-from fabfem.fem.supports import Constraints, Reduction
+from fabfem.fem.supports import Constraints
 from fabfem.timing import Timer
 
 PHASES = ("material", "assembly", "linear_solve")
@@ -32,6 +35,8 @@ class System(NamedTuple):
     timer: Timer
     stiffest: float
     """Largest diagonal entry of the elastic stiffness."""
+    water: Water | None = None
+    """What pore water does, where its pressure is unknown."""
 
 
 class Equilibrium(NamedTuple):
@@ -40,7 +45,7 @@ class Equilibrium(NamedTuple):
     displacement: np.ndarray
     states: States
     force: np.ndarray
-    """(ndof,) internal force, without drag."""
+    """(ndof,) internal force of the skeleton, without drag."""
     tangent: np.ndarray
     """(npoints, 6, 6) what the first correction of the next increment uses."""
 
@@ -51,9 +56,13 @@ class Task(NamedTuple):
     load: np.ndarray
     """(ndof,) external force at its end."""
     motion: np.ndarray
-    """Displacement of the held dofs in it."""
+    """(ndof,) displacement in it of the dofs that are no unknowns."""
     viscous: np.ndarray | None
     """(npoints, 6, 6) viscous stress by strain increment, where there is viscosity."""
+    start: np.ndarray | None = None
+    """(ndof,) internal force at its start, where that is not the skeleton's alone."""
+    wet: csr_matrix | None = None
+    """What water adds to the stiffness."""
 
 
 class Trial(NamedTuple):
@@ -66,11 +75,18 @@ class Trial(NamedTuple):
     """(ndof,) internal force, drag included."""
     drag: np.ndarray
     """(ndof,) nodal forces of the viscous stress."""
+    water: np.ndarray
+    """(ndof,) nodal forces of the pore pressure, and volumes of water that go nowhere."""
     unbalanced: np.ndarray
-    """Out-of-balance force on free dofs."""
+    """Out-of-balance force on the unknowns."""
     norm: float
     residual: float
     """The norm relative to the forces at work."""
+
+    @property
+    def skeleton(self) -> np.ndarray:
+        """(ndof,) internal force of the skeleton, without drag."""
+        return self.force - self.drag - self.water
 
 
 def make_task(system: System, old: Equilibrium, load: np.ndarray, size: float) -> Task:
@@ -78,7 +94,23 @@ def make_task(system: System, old: Equilibrium, load: np.ndarray, size: float) -
     eta, viscous = system.controls.viscosity, None
     if eta > 0.0:
         viscous = eta / size * elastic_tangents(system.zones, old.states, system.space.npoints)
-    return Task(load, size * system.constraints.motion, viscous)
+    motion = size * system.constraints.motion
+    if system.water is None:
+        return Task(load, motion, viscous)
+    _let_out(system, old, motion)
+    return Task(load, motion, viscous, begun(system, old, size), system.water.matrix(size))
+
+
+def _let_out(system: System, old: Equilibrium, motion: np.ndarray) -> None:
+    """Take held pressures to their value at once: a drain does not open slowly."""
+    constraints, nmotion = system.constraints, system.water.nmotion if system.water else 0
+    held = np.setdiff1d(np.arange(nmotion, system.space.ndof), constraints.free)
+    motion[held] = constraints.motion[held] - old.displacement[held]
+
+
+def begun(system: System, old: Equilibrium, size: float) -> np.ndarray:
+    """The (ndof,) internal force at the start of an increment, water included."""
+    return old.force if system.water is None else old.force + system.water.start(old.displacement, size)
 
 
 def attempt(system: System, old: Equilibrium, task: Task, step: np.ndarray) -> Trial | Refusal:
@@ -90,10 +122,29 @@ def attempt(system: System, old: Equilibrium, task: Task, step: np.ndarray) -> T
         return batch
     with system.timer.phase("assembly"):
         drag = _drag(system, task, strain)
-        force = system.space.internal_force(batch.stress) + drag
-    unbalanced = (task.load - force)[system.constraints.free]
-    size = norm(unbalanced)
-    return Trial(step, batch, force, drag, unbalanced, size, relative(size, force, task.load))
+        water = _water(old, task, step)
+        force = system.space.internal_force(batch.stress) + drag + water
+    unbalanced = system.constraints.collect(task.load - force)
+    size = norm(mechanical(system, unbalanced))
+    residual = relative(size, mechanical(system, force), task.load)
+    if system.water is not None:
+        residual = max(residual, system.water.misfit(step, water, system.constraints.free))
+    return Trial(step, batch, force, drag, water, unbalanced, size, residual)
+
+
+def mechanical(system: System, values: np.ndarray) -> np.ndarray:
+    """Forces, of all dofs or of the unknowns, without the volumes of water."""
+    if system.water is None:
+        return values
+    if len(values) == system.space.ndof:
+        return values[: system.water.nmotion]
+    return np.delete(values, np.flatnonzero(system.constraints.free >= system.water.nmotion))
+
+
+def _water(old: Equilibrium, task: Task, step: np.ndarray) -> np.ndarray:
+    if task.wet is None or task.start is None:
+        return np.zeros(len(step))
+    return task.start - old.force + task.wet @ step
 
 
 def _drag(system: System, task: Task, strain: np.ndarray) -> np.ndarray:

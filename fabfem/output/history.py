@@ -14,13 +14,31 @@ class History:
         File to write, replaced if it is there.
     headers : sequence of str
         Name and unit of each column.
+    kept : int, optional
+        Size of an earlier run's table to go on from [bytes]; what is behind it is cut off.
+
+    Raises
+    ------
+    OSError
+        If the file cannot be written, or is shorter than what is to be kept.
     """
 
-    def __init__(self, path: Path, headers: Sequence[str]) -> None:
+    def __init__(self, path: Path, headers: Sequence[str], kept: int = 0) -> None:
         self.width = len(headers)
-        self._file = path.open("w", encoding="utf-8", newline="")
+        if kept and (not path.is_file() or path.stat().st_size < kept):
+            raise OSError(0, "is shorter than when the checkpoint was written; the run cannot go on from there", path)
+        self._file = path.open("r+" if kept else "w", encoding="utf-8", newline="")
         self._writer = csv.writer(self._file, lineterminator="\n")
-        self._put(headers)
+        if kept:
+            self._file.seek(kept)
+            self._file.truncate()
+        else:
+            self._put(headers)
+
+    @property
+    def size(self) -> int:
+        """Size so far [bytes]."""
+        return self._file.tell()
 
     def write(self, row: Sequence[str | int | float]) -> None:
         """Append a row, one value per column, and hand it to the operating system at once."""

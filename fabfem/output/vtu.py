@@ -50,24 +50,35 @@ class Frame(NamedTuple):
     """Fields at nodes, first axis the node."""
     in_cells: Arrays
     """Means in cells, first axis the cell."""
+    points: NDArray[np.float64] | None = None
+    """Places of the nodes where they are not those of the files."""
 
 
 class FieldFiles:
-    """The ``.vtu`` files of a run and the collection that lists them."""
+    """The ``.vtu`` files of a run and the collection that lists them; `stored` are those of an earlier run."""
 
     def __init__(
-        self, folder: Path, points: NDArray[np.float64], cells: NDArray[np.integer], cell_type: str, note: str
+        self,
+        folder: Path,
+        points: NDArray[np.float64],
+        cells: NDArray[np.integer],
+        cell_type: str,
+        note: str,
+        stored: Sequence[tuple[float, str]] = (),
     ) -> None:
         self.folder = folder
         self.note = note.replace("--", "-")
+        self._cells, self._cell_type = cells, cell_type
         self._geometry = _geometry(points, cells, cell_type)
-        self._stored: list[tuple[float, str]] = []
+        self.stored = list(stored)
+        if stored:
+            write_atomic(folder / "fields.pvd", self._collection())
 
     def write(self, frame: Frame) -> Path:
         """Store a frame and list it in the collection; return its file."""
-        name = f"fields_{len(self._stored):04d}.vtu"
+        name = f"fields_{len(self.stored):04d}.vtu"
         write_atomic(self.folder / name, "\n".join(self._lines(frame)))
-        self._stored.append((frame.time, name))
+        self.stored.append((frame.time, name))
         write_atomic(self.folder / "fields.pvd", self._collection())
         return self.folder / name
 
@@ -82,7 +93,7 @@ class FieldFiles:
         yield _array("TimeValue", np.array([frame.time]), tuples=True)
         yield _array("compression_positive", np.array([1], dtype=np.int32), tuples=True)
         yield "</FieldData>"
-        yield self._geometry
+        yield self._geometry if frame.points is None else _geometry(frame.points, self._cells, self._cell_type)
         for place, fields in (("PointData", frame.at_nodes), ("CellData", frame.in_cells)):
             yield f"<{place}>"
             yield from (_array(name, np.asarray(values, dtype=np.float32)) for name, values in fields.items())
@@ -90,7 +101,7 @@ class FieldFiles:
         yield "</Piece></UnstructuredGrid></VTKFile>\n"
 
     def _collection(self) -> str:
-        entries = [f'<DataSet timestep="{time!r}" part="0" file="{name}"/>' for time, name in self._stored]
+        entries = [f'<DataSet timestep="{time!r}" part="0" file="{name}"/>' for time, name in self.stored]
         head = f'<?xml version="1.0"?>\n<!-- {self.note} -->\n<VTKFile type="Collection" version="1.0"><Collection>'
         return "\n".join([head, *entries, "</Collection></VTKFile>\n"])
 

@@ -43,6 +43,11 @@ def draw(folder: Path) -> list[Path]:
     deformed = grid.warp_by_vector("displacement") if "displacement" in grid.point_data else grid
     plotter, title = _plotter(), _title(folder)
     pictures = [_shoot(_shear(plotter, deformed), title, folder / "shear_strain.png")]
+    if {"displacement_increment", "strain_increment"} <= set(grid.point_data.keys()):
+        plotter = _plotter()
+        pictures.append(
+            _shoot(_mechanism(plotter, grid), f"{title}; what the last increment adds", folder / "mechanism.png")
+        )
     if "fabric" in grid.point_data:
         plotter = _plotter()
         pictures.append(_shoot(_fabric(plotter, deformed), title, folder / "fabric.png"))
@@ -71,6 +76,38 @@ def _shear(plotter: pyvista.Plotter, grid: pyvista.UnstructuredGrid) -> "Drawn":
     )
     plotter.add_mesh(edges, color=INK, line_width=1, opacity=0.3)
     return Drawn(plotter, bounds)
+
+
+def _mechanism(plotter: pyvista.Plotter, grid: pyvista.UnstructuredGrid) -> "Drawn":
+    """Draw how the body moves in the last increment: arrows over the shear strain, both relative to the largest."""
+    sheared = shear_strain(grid.point_data["strain_increment"])
+    grid["shear"] = sheared / max(float(np.nanpercentile(sheared, SATURATED)), 1e-300)
+    bounds = grid.bounds
+    surface = grid.extract_surface(nonlinear_subdivision=2, algorithm="dataset_surface")
+    plotter.add_mesh(
+        surface,
+        scalars="shear",
+        cmap="OrRd",
+        clim=(0.0, 1.0),
+        scalar_bar_args=_bar("shear strain of the increment, relative"),
+        lighting=False,
+    )
+    moved = np.linalg.norm(grid.point_data["displacement_increment"], axis=1)
+    chosen = grid.extract_points(_spread(grid, bounds) & (moved > 0.02 * moved.max()), include_cells=False)
+    longest = 1.5 * max(bounds[1] - bounds[0], bounds[3] - bounds[2]) / GLYPHS_ACROSS
+    arrows = chosen.glyph(orient="displacement_increment", scale="displacement_increment", factor=longest / moved.max())
+    plotter.add_mesh(arrows, color=INK, lighting=False)
+    return Drawn(plotter, bounds)
+
+
+def _spread(grid: pyvista.UnstructuredGrid, bounds: tuple[float, ...]) -> NDArray[np.bool_]:
+    """Return a mask of nodes that lie about evenly: the first in each cell of a lattice."""
+    spacing = max(bounds[1] - bounds[0], bounds[3] - bounds[2]) / (2 * GLYPHS_ACROSS)
+    cells = np.floor((grid.points - grid.points.min(axis=0)) / spacing).astype(np.int64)
+    _, first = np.unique(cells, axis=0, return_index=True)
+    mask = np.zeros(grid.n_points, bool)
+    mask[first] = True
+    return mask
 
 
 def _cropped(surface: pyvista.PolyData, bounds: tuple[float, ...]) -> pyvista.DataSet:
@@ -209,6 +246,9 @@ def _title(folder: Path) -> str:
     named = report["title"] or report["case"]
     if not report["increments"]:
         return str(named)
+    safety = report.get("factor_of_safety")
+    if safety and safety["first_failure"]:
+        return f"{named}\n{safety['verdict']} with the strength divided by {safety['first_failure']:.4g}"
     end = report["increments"][-1]
     return f"{named}\n{end['stage']} {100.0 * end['fraction']:.0f} % done, deformed at true scale"
 

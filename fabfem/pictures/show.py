@@ -9,14 +9,18 @@ import os
 import subprocess
 import sys
 from collections.abc import Sequence
+from importlib import import_module
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from fabfem.case import CaseError
 from fabfem.output.history import read_history
 
 DRAW = (sys.executable, "-m", "fabfem.pictures.draw")
 """Command that draws the fields of the folder it is given."""
+
+DRAWERS = {"fabric": "fabfem.pictures.curves", "element": "fabfem.pictures.laboratory"}
+"""Module that draws the pictures of a kind of scene which is no boundary-value problem; it has `draw(folder)`."""
 
 TIME_LIMIT = 600.0
 """Longest time that drawing the fields may take [s]."""
@@ -42,15 +46,20 @@ def show(folder: Path) -> Shown:
     Parameters
     ----------
     folder : Path
-        Folder that ``fabfem solve`` wrote.
+        Folder that ``fabfem solve`` or ``fabfem sweep`` wrote.
 
     Raises
     ------
     CaseError
         If the folder holds no result.
     """
+    if (folder / "sweep.json").is_file():
+        return Shown(tuple(import_module("fabfem.pictures.sweep").draw(folder)), "")
     if not (folder / "history.csv").is_file():
         raise CaseError(f"{folder}: holds no result (there is no history.csv)")
+    drawer = DRAWERS.get(_kind(folder))
+    if drawer:
+        return Shown(tuple(import_module(drawer).draw(folder)), "")
     pictures = [*_curve(folder)]
     before = {picture.name: picture.stat().st_mtime_ns for picture in folder.glob("*.png")}
     trouble = _draw_fields(folder) if (folder / "fields_0000.vtu").is_file() else ""
@@ -111,6 +120,12 @@ def _axis(header: str) -> str:
 def _report(folder: Path) -> dict[str, object]:
     path = folder / "report.json"
     return json.loads(path.read_text(encoding="utf-8")) if path.is_file() else {}
+
+
+def _kind(folder: Path) -> str:
+    """Return the kind of scene that a result is of."""
+    case: Any = _report(folder).get("resolved_case", {})
+    return str(case.get("scene", {}).get("kind", "boundary_value"))
 
 
 def _columns(folder: Path) -> dict[str, list[str]]:

@@ -18,8 +18,9 @@ from fabfem.fem.assembly import find_pattern, stiffness
 from fabfem.fem.box import box_mesh
 from fabfem.fem.kinematics import KINEMATICS
 from fabfem.fem.linear import make_solver, norm
+from fabfem.fem.reduction import reduction
 from fabfem.fem.space import Space, build_space
-from fabfem.fem.supports import Support, constrain, reduction
+from fabfem.fem.supports import Support, constrain
 from umat import Elastic, elastic_tangent, initial_state
 
 

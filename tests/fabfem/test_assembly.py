@@ -134,3 +134,14 @@ def test_means_and_smoothing_keep_linear_fields() -> None:
     np.testing.assert_allclose(space.nodal(values), 1.0 + space.mesh.points @ [2.0, -3.0], atol=1e-12)
     centres = space.mesh.points[space.mesh.cells[:, :4]].mean(axis=1)
     np.testing.assert_allclose(space.cell_mean(np.stack([values] * 2, axis=1))[:, 1], 1.0 + centres @ [2.0, -3.0])
+
+
+def test_bounded_smoothing_stays_within_the_points_around_a_node() -> None:
+    space, _ = case("quad8")
+    values = np.where(np.arange(space.npoints) == 0, 1.0, 0.0)
+    assert space.nodal(values).min() < -0.1
+    bounded = space.nodal_within(values)
+    assert bounded.min() == 0.0 < bounded.max() <= 1.0
+    smooth = 1.0 + 0.1 * space.points @ [2.0, -3.0]
+    inner = np.ptp(space.nodal(smooth)) / len(space.mesh.cells) ** 0.5
+    np.testing.assert_allclose(space.nodal_within(smooth), space.nodal(smooth), atol=inner)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from fabfem.boundary_value.problem import build
-from fabfem.case import case_from, read_case
+from fabfem.case import CaseError, case_from, read_case
 from fabfem.case.materials import Fabric
 from fabfem.fem.loads import Gravity, Pressure
 from fabfem.substance import deposit, rule_for
@@ -76,3 +76,28 @@ def test_the_ground_carries_its_weight(folder: Path) -> None:
     np.testing.assert_allclose(stress[:, 1], 2.0 + 15.3 * depth)
     np.testing.assert_allclose(stress[:, 0], 0.5 * stress[:, 1])
     assert not stress[:, 3:].any()
+
+
+@pytest.mark.parametrize(
+    ("said", "mean", "points"),
+    [
+        ({}, False, 3),
+        ({"order": 1}, True, 1),
+        ({"order": 1, "volume_strain": "pointwise"}, False, 1),
+        ({"volume_strain": "mean", "points": 6}, True, 6),
+    ],
+)
+def test_linear_elements_have_a_mean_volume_strain(folder: Path, said: dict, mean: bool, points: int) -> None:
+    tables = tomllib.loads((folder / "case.toml").read_text(encoding="utf-8"))
+    tables["mesh"] |= said
+    space = build(case_from(tables, folder / "case.toml")).model.space
+    assert (space.kinematics.mean_dilation, space.nq) == (mean, points)
+
+
+def test_a_rule_that_an_element_lacks_is_refused(folder: Path) -> None:
+    tables = tomllib.loads((folder / "case.toml").read_text(encoding="utf-8"))
+    tables["mesh"]["points"] = 5
+    with pytest.raises(
+        CaseError, match=r"^case.toml: mesh.points: triangle6 has no rule of 5 points; it has \[3, 6, 7\]$"
+    ):
+        build(case_from(tables, folder / "case.toml"))

@@ -37,7 +37,7 @@ BAD = {
     "unknown stage": (
         '"geostatic"\nk0',
         '"geo"\nk0',
-        "stage[geostatic].kind: must be one of 'geostatic', 'load' (got 'geo')",
+        "stage[geostatic].kind: must be one of 'geostatic', 'gravity', 'load', 'strength_reduction' (got 'geo')",
     ),
     "unknown kinematics": ("plane_strain", "plain_strain", "did you mean 'plane_strain'?"),
     "component that is not there": (

@@ -3,7 +3,6 @@
 import os
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import pytest
@@ -34,9 +33,11 @@ BAD = {
 
 def test_help_is_quick_and_imports_nothing_heavy() -> None:
     def seconds() -> float:
-        begun = time.perf_counter()
+        """Processor time, which other programs on the machine do not lengthen."""
+        begun = os.times()
         subprocess.run([sys.executable, "-m", "fabfem", "--help"], check=True, capture_output=True)
-        return time.perf_counter() - begun
+        ended = os.times()
+        return ended.children_user - begun.children_user + ended.children_system - begun.children_system
 
     assert min(seconds() for _ in range(5)) < 0.3
     code = f"import sys, fabfem.cli; print([name for name in {HEAVY} if name in sys.modules])"

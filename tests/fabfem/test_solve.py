@@ -9,7 +9,7 @@ import pytest
 
 from fabfem.fem.box import box_mesh
 from fabfem.fem.kinematics import KINEMATICS
-from fabfem.fem.loads import Gravity, Load, Pressure, Traction, k0_stress
+from fabfem.fem.loads import Gravity, Load, Pressure, k0_stress
 from fabfem.fem.mesh import Mesh, outer_facets, read_mesh
 from fabfem.fem.model import Controls, Model, Zone
 from fabfem.fem.solve import Increment, Stopped, march, reaction
@@ -90,32 +90,6 @@ def test_lame_cylinder(cell_type: str, kinematics: str, solver: str) -> None:
     hoop = -space.nodal(step.states["all"].stress)[:, 2]
     np.testing.assert_allclose(hoop[inner], 1.666667, rtol=1e-2)
     np.testing.assert_allclose(hoop[outer], 0.666667, rtol=1e-2)
-
-
-def test_plane_strain_equals_a_slab() -> None:
-    """One element of thickness held on both faces is plane strain."""
-    flat = build_space(box_mesh("quad8", (4, 3), (0, 0), (2, 1)), KINEMATICS["plane_strain"])
-    slab = build_space(box_mesh("hexahedron20", (4, 1, 3), (0, 0, 0), (2, 1, 1)), KINEMATICS["solid"])
-    material = VonMises(1e4, 0.3, 30.0, 500.0)
-    held = (Support("left", "x"), Support("bottom", "y"), Support("top", "y", -0.02))
-    thick = (
-        Support("left", "x"),
-        Support("bottom", "z"),
-        Support("top", "z", -0.02),
-        Support("front", "y"),
-        Support("back", "y"),
-    )
-    ends = []
-    for space, supports, push in ((flat, held, (3.0, 5.0)), (slab, thick, (3.0, 0.0, 5.0))):
-        stage = Stage("push", supports, (Traction("right", push),), first=0.25, largest=0.25)
-        ends.append(run(Model(space, filled(space, material), (stage,), Controls(tolerance=1e-12)))[-1])
-    plane, solid = (
-        step.displacement.reshape(-1, space.mesh.dim) for step, space in zip(ends, (flat, slab), strict=True)
-    )
-    front = np.flatnonzero(slab.mesh.points[:, 1] == 0.0)
-    places = slab.mesh.points[front][:, [0, 2]]
-    match = [int(np.abs(flat.mesh.points - place).max(axis=1).argmin()) for place in places]
-    np.testing.assert_allclose(solid[front][:, [0, 2]], plane[match], rtol=0, atol=1e-8 * 0.02)
 
 
 def geostatic(space: Space, k0: float, level: float = 0.0, surcharge: float = 3.0) -> Model:

@@ -366,7 +366,15 @@ def no_ratio(seed: int = 15) -> np.ndarray:
     return inputs
 
 
+def isotropic_fabric(seed: int = 18) -> np.ndarray:
+    """Return inputs with F = 0."""
+    inputs = sample(seed)
+    inputs[FABRIC], inputs[STRAIN] = 0.0, inputs[PLASTIC]
+    return inputs
+
+
 PULL = 0.66 / 0.78  # C_F of Yuan in triaxial compression
+LOADING = (1.25**2 + 1.5 * 0.6**2) ** 2 / (1.25 * (2.0 / 3.0) ** 0.5)  # ‖ε̇_q^p‖/Λ̇ of Tian & Yao at ‖s/p‖ = 0.6
 SIMPLE = ZhaoKruyt(m=0.0, extension=1.0)  # h (F_c − F:n) ε̇_q^p at ψ = 0
 COINCIDENCES = [
     ("with F along n", coaxial, SIMPLE, LiDafalias(rate=10.0)),
@@ -383,6 +391,11 @@ COINCIDENCES = [
     ("strain all plastic", isochoric, SunSundaresan(), LiDafalias()),
     ("no migration", sample, Yuan(creation=0.3, creation_growth=0.0, migration=0.0, creation_shape=1.0), WanGuo(0.3)),
     ("one stress ratio", at_one_ratio, Yuan(migration=5.0), LiDafalias(rate=5.0, critical_fabric=0.6 * PULL)),
+    ("F along n", coaxial, NematNasser(rate=4.8, limit=0.48), LiDafalias(rate=10.0)),
+    ("no fabric yet", isotropic_fabric, UniformStrain(share=2.0), SunSundaresan(rate=6.0, decay=0.0, joint=5.0)),
+    ("no fabric yet, decay", isotropic_fabric, SunSundaresan(rate=4.8), LiDafalias()),
+    ("no fabric yet, exponential", isotropic_fabric, Petalas(rate=10.0), WooSalgado()),
+    ("no creation", at_one_ratio, Yuan(creation=0.0), TianYao(rate=7.6 * LOADING, attraction=-PULL / 7.5)),
     ("same in compression", at_one_ratio, Yuan(), older(Yuan())),
     ("no influence of b", sample, older(Yuan(ratio_shape=0.8)), older(Yuan(ratio_shape=0.8, extension_fabric=9.0))),
 ]  # fmt: skip

@@ -12,7 +12,7 @@ from umat.directions import directions
 from umat.lanes import COMPILED
 from umat.sands import TOYOURA_FABRIC_NORM, toyoura
 
-DATA = Path(__file__).parents[1] / "data"
+DATA = Path(__file__).parents[2] / "fabfem" / "verification" / "prototype"
 #: file, void ratio and leg to the last strain of the file
 CURVES = {
     "drained_tc": (0.80, path.triaxial),

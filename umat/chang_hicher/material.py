@@ -150,18 +150,26 @@ def start(
     )
 
 
+def packed_void_ratio(state: ChangHicherState) -> Array:
+    """Return the void ratio of the packing that closes again, without the gap."""
+    return (1.0 + state.void_ratio) * np.exp(-state.gap) - 1.0
+
+
 def fields(material: ChangHicher, state: ChangHicherState) -> dict[str, Array]:
     """Return the derived fields of a state.
 
-    void_ratio; state_parameter ψ = e − e_c; fabric (n, 6) F and fabric_norm ‖F‖; anisotropy F:n with n the direction
+    void_ratio, of the packing, and gap, the volumetric strain by which an open packing has come apart;
+    state_parameter ψ = e − e_c; fabric (n, 6) F and fabric_norm ‖F‖; anisotropy F:n with n the direction
     of the stress deviator; mobilised_friction, the angle of (σ1 − σ3)/(σ1 + σ3) = sin φ [deg].
     """
     floor = 1e-12 * material.reference_pressure
     s = deviator(state.stress)
     major, _, minor = np.moveaxis(principal(state.stress), -1, 0)
+    void_ratio = packed_void_ratio(state)
     return {
-        "void_ratio": state.void_ratio,
-        "state_parameter": state.void_ratio - critical_void_ratio(material, mean(state.stress)),
+        "void_ratio": void_ratio,
+        "gap": state.gap,
+        "state_parameter": void_ratio - critical_void_ratio(material, mean(state.stress)),
         "fabric": state.fabric,
         "fabric_norm": norm(state.fabric),
         "anisotropy": dot(state.fabric, s) / np.maximum(norm(s), floor),
@@ -182,7 +190,7 @@ def elastic(material: ChangHicher, state: ChangHicherState) -> Array:
     """
     constants = constants_of(material)
     compliance, ease_t, _ = constants.elastic
-    e = np.minimum((1.0 + state.void_ratio) * np.exp(-state.gap) - 1.0, 1.5)  # without the gap
+    e = np.minimum(packed_void_ratio(state), 1.5)
     p = np.maximum(mean(state.stress) / material.reference_pressure, material.open_pressure)
     density = 3.0 / (2.0 * np.pi) * (13.28 - 8.0 * e) / (1.0 + e)
     normal = 0.5 * compliance / np.sqrt(3.0 * p / density) * 9.0 / density

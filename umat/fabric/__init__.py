@@ -1,4 +1,8 @@
-"""Fabric evolution laws, one file each; a new file here is a new law (see `law`)."""
+"""Fabric evolution laws, one file each; a new file here is a new law (see `law`).
+
+The laws of `probe_2d` are of the plane and stay outside the stress point; they run along given histories
+(`umat.fabric_history`) like all others.
+"""
 
 from typing import Any
 
@@ -7,6 +11,7 @@ from .law import fabric_increment, known_laws
 from .li_dafalias import LiDafalias
 from .nemat_nasser import NematNasser
 from .petalas import Petalas
+from .probe_2d import PLANAR_LAWS, Probe2D, Probe2DByAnisotropy, UniformStrain2D
 from .sun_sundaresan import SunSundaresan
 from .tian_yao import TianYao
 from .uniform_strain import UniformStrain
@@ -18,13 +23,17 @@ from .zhao_kruyt import ZhaoKruyt
 
 __all__ = [
     "LAWS",
+    "PLANAR_LAWS",
     "Constant",
     "LiDafalias",
     "NematNasser",
     "Petalas",
+    "Probe2D",
+    "Probe2DByAnisotropy",
     "SunSundaresan",
     "TianYao",
     "UniformStrain",
+    "UniformStrain2D",
     "WanGuo",
     "WooSalgado",
     "Yang",

@@ -1,0 +1,74 @@
+"""The null-step audit: how much the first equilibrium moves, and why.
+
+A geostatic stage begins with a stress that is guessed (K0), a gravity stage with none or a little. The audit of the
+first says how far out of balance the guess was before anything moved and where most, that of the second what is left
+after gravity was turned on; both how far the ground moved and how many points yielded.
+"""
+
+from typing import Any
+
+import numpy as np
+
+import umat
+from fabfem.boundary_value.problem import Problem
+from fabfem.case.stages import Geostatic, Gravity
+from fabfem.fem.increment import Increment
+from fabfem.fem.model import stress_of
+from fabfem.fem.supports import constrain
+
+BALANCED = 1e-6
+"""Relative out-of-balance force below which a guess is in balance."""
+
+
+def audited(problem: Problem, increment: Increment) -> bool:
+    """Return whether an increment ends a stage that makes the state before anything is built."""
+    return isinstance(problem.case.stage[increment.stage_index], Geostatic | Gravity) and increment.fraction >= 1.0
+
+
+def audit(problem: Problem, increment: Increment) -> dict[str, Any]:
+    """Return the audit of the stage that an increment ends."""
+    geostatic = isinstance(problem.case.stage[increment.stage_index], Geostatic)
+    found: dict[str, Any] = {
+        "stage": increment.stage,
+        "out_of_balance": increment.out_of_balance if geostatic else increment.residuals[-1],
+        "moved": float(np.linalg.norm(problem.model.space.displacement(increment.displacement), axis=1).max()),
+        "yielded": yielded(problem, increment),
+    }
+    if geostatic and found["out_of_balance"] > BALANCED:
+        found |= _worst(problem, increment)
+    return found | {"why": _why(found, geostatic)}
+
+
+def yielded(problem: Problem, increment: Increment) -> float | None:
+    """Return the share of the volume that has yielded since the run began, None where no material knows."""
+    space, known = problem.model.space, 0.0
+    total = 0.0
+    for name, zone in increment.zones.items():
+        volume = space.weights[zone.points]
+        strain = umat.state_fields(zone.material, increment.states[name]).get("plastic_strain")
+        if strain is not None:
+            known, total = known + volume[strain > 0.0].sum(), total + volume.sum()
+    return float(known / total) if total else None
+
+
+def _worst(problem: Problem, increment: Increment) -> dict[str, Any]:
+    """Return where the guess was most out of balance, and on which boundaries that is."""
+    model, stage = problem.model, problem.model.stages[increment.stage_index]
+    space = model.space
+    force = increment.external_force - space.internal_force(stress_of(increment.zones, increment.before, space.npoints))
+    kept = constrain(space, stage.supports, stage.bodies).keep_unknown(force)
+    node, component = divmod(int(np.abs(kept).argmax()), len(space.components))
+    on = [name for name, facets in space.mesh.boundaries.items() if (facets == node).any()]
+    return {"at": space.mesh.points[node].tolist(), "component": space.components[component], "boundaries": on}
+
+
+def _why(found: dict[str, Any], geostatic: bool) -> str:
+    if not geostatic:
+        return "gravity was turned on, so the ground moved into its first equilibrium; displacements count from there"
+    if found["out_of_balance"] <= BALANCED:
+        return "the guessed stress is in balance"
+    place = f"on {' and '.join(found['boundaries'])}" if found["boundaries"] else "inside the ground"
+    at = ", ".join(f"{value:.4g}" for value in found["at"])
+    causes = "a surface that is not level, a load that the surcharge does not include, or zones that differ sideways"
+    strength = f"; {100 * found['yielded']:.3g} % of the ground yielded under it" if found["yielded"] else ""
+    return f"the guessed stress is out of balance most {place} at ({at}) along {found['component']}: {causes}{strength}"

@@ -1,0 +1,41 @@
+"""What ``[solver] diagnose = true`` records of the stiffness at the end of every increment, a column each.
+
+Both are those of `fabfem.fem.diagnosis`; each increment pays for one more factorisation.
+"""
+
+from fabfem.boundary_value.probes import Column
+from fabfem.fem.assembly import stiffness
+from fabfem.fem.diagnosis import Condition, condition
+from fabfem.fem.increment import Increment
+from fabfem.fem.model import Model
+from fabfem.fem.solve import systems_of
+
+
+class Conditioning:
+    """The condition of the stiffness of the last increment that was asked for."""
+
+    def __init__(self, model: Model) -> None:
+        self._systems = systems_of(model)
+        self._last: tuple[int, Condition] | None = None
+
+    def of(self, increment: Increment) -> Condition:
+        """Return condition number and pivot growth of the tangent at the end of an increment."""
+        if self._last is None or self._last[0] != increment.number:
+            self._last = (increment.number, self._found(increment))
+        return self._last[1]
+
+    def _found(self, increment: Increment) -> Condition:
+        system = self._systems[increment.stage_index]
+        matrix = stiffness(system.space, system.pattern, increment.tangent)
+        if system.water is not None:
+            matrix.data += system.water.matrix(increment.size).data
+        return condition(system.reduce(matrix))
+
+
+def conditioning_columns(model: Model) -> tuple[Column, ...]:
+    """Return the columns ``condition_number`` and ``pivot_growth``."""
+    found = Conditioning(model)
+    return (
+        Column("condition_number", "-", "", lambda increment: found.of(increment).number),
+        Column("pivot_growth", "-", "", lambda increment: found.of(increment).growth),
+    )

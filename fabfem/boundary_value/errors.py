@@ -1,0 +1,228 @@
+"""How wrong a run is, by its own estimate: what ``[errors]`` asks for, a column of the history each.
+
+* ``equilibrium``: the force that the last iteration left out of balance, with the drag of the viscosity, over the
+  forces at work.
+* ``integration``: the error of the stress that the points estimate for their own steps, over the stress, both root mean
+  square over the volume, added up over the increments. Materials in closed form have none.
+* ``discretisation``: of the mesh, in the energy norm, from the recovered stress (`fabfem.fem.recovery`), over the norm
+  of the stress. The field ``discretisation_error`` says where: the root of the error's energy density over the mean
+  energy density.
+* ``directions``: of the set of contact directions. Some points of each zone, spread evenly over its volume, go through
+  the same strains with a second rule; the distance of the two stresses over the first, both root mean square.
+"""
+
+from collections.abc import Callable, Mapping
+from functools import cached_property
+from typing import Any, NamedTuple
+
+import numpy as np
+from scipy.sparse import csr_matrix
+
+import umat
+from fabfem.boundary_value.probes import Column, Keeper, Value
+from fabfem.case import BoundaryValueCase, CaseError
+from fabfem.fem.model import Model, Zone, elastic_tangents
+from fabfem.fem.recovery import energy_density, fine_space, nearest, recovery, stress_within
+from fabfem.fem.solve import Increment
+from fabfem.substance import Substance
+from umat.mandel import Array, norm
+from umat.status import OK
+
+FIELD = "discretisation_error"
+
+
+class Discretisation:
+    """The error of the mesh."""
+
+    def __init__(self, model: Model) -> None:
+        self.model = model
+        self.fine = fine_space(model.space)
+
+    @cached_property
+    def operator(self) -> csr_matrix:
+        """Matrix that recovers the stress at the fine points."""
+        nq = self.model.space.nq
+        zones = [_ids(zone, self.model)[::nq] // nq for zone in self.model.zones.values()]
+        return recovery(self.model.space, self.fine, zones)
+
+    def energies(self, increment: Increment) -> tuple[Array, Array]:
+        """Return the (nel,) energies of the error and of the stress."""
+        zones, space = self.model.zones, self.model.space
+        stress = _stress(self.model, increment)
+        points = elastic_tangents(zones, increment.states, space.npoints).reshape(-1, space.nq, 6, 6)
+        elastic = points[:, nearest(space, self.fine)].reshape(-1, 6, 6)
+        within = stress_within(space, self.fine, stress, increment.tangent, increment.displacement)
+        weights = self.fine.weights
+        parts = (energy_density(part, elastic) * weights for part in (self.operator @ stress - within, within))
+        error, energy = (part.reshape(-1, self.fine.nq).sum(axis=1) for part in parts)
+        return error, energy
+
+    def field(self, increment: Increment) -> Array:
+        """Return the (npoints,) root of the error's energy density in the element over the mean energy density."""
+        error, energy = self.energies(increment)
+        volume = self.fine.weights.reshape(-1, self.fine.nq).sum(axis=1)
+        mean = energy.sum() / volume.sum()
+        found = np.sqrt(error / volume / mean) if mean > 0.0 else np.zeros_like(error)
+        return np.repeat(found, self.model.space.nq)
+
+    def value(self, increment: Increment) -> float:
+        """Return the norm of the error over that of the recovered stress, both in energy."""
+        error, energy = (float(part.sum()) for part in self.energies(increment))
+        return float(np.sqrt(error / (energy + error))) if energy > 0.0 else 0.0
+
+
+class Integration:
+    """The error of the points' integration, added up."""
+
+    def __init__(self, model: Model) -> None:
+        self.model, self.weights = model, model.space.weights
+        self.total = 0.0
+
+    def value(self, increment: Increment) -> float:
+        """Return the sum over all increments so far."""
+        size = norm(_stress(self.model, increment))
+        whole = float(np.sqrt(self.weights @ size**2))
+        self.total += float(np.sqrt(self.weights @ (increment.local_error * size) ** 2)) / whole if whole else 0.0
+        return self.total
+
+    def memory(self) -> float:
+        """Return the sum so far."""
+        return self.total
+
+    def recall(self, memory: float) -> None:
+        """Go on from a sum."""
+        self.total = memory
+
+
+class _Sampled(NamedTuple):
+    """Some points of a zone under the second rule."""
+
+    zone: Zone
+    second: Substance
+    ids: Array
+    """Numbers of the points in the space."""
+    within: Array
+    """Their numbers in the zone."""
+
+
+class Directions:
+    """The error of the set of contact directions."""
+
+    def __init__(self, model: Model, seconds: Mapping[str, Substance], samples: int) -> None:
+        self.model = model
+        self.sampled = {name: _sampled(zone, seconds[name], model, samples) for name, zone in _spread(model, seconds)}
+        self.states = {name: _started(sampled) for name, sampled in self.sampled.items()}
+        self.alive = {name: np.ones(len(sampled.ids), bool) for name, sampled in self.sampled.items()}
+        self._last: tuple[int, Array] | None = None
+
+    def value(self, increment: Increment) -> Value:
+        """Return the distance of the stresses by the two rules; nothing where the second refused all points."""
+        strain = self.model.space.strain(increment.displacement - self._before(increment))
+        self._last = increment.stage_index, increment.displacement
+        followed = [self._follow(name, strain, increment) for name in self.sampled]
+        gaps, stress = (np.concatenate(part) for part in zip(*followed, strict=True))
+        return float(np.sqrt(np.sum(gaps**2) / np.sum(stress**2))) if stress.any() else ""
+
+    def _before(self, increment: Increment) -> Array:
+        """Return the displacement from which an increment set out."""
+        if self._last is None:
+            return np.zeros(self.model.space.ndof)
+        stage_index, displacement = self._last
+        moved_on = stage_index != increment.stage_index
+        return displacement * (not (moved_on and self.model.stages[stage_index].zero_displacement))
+
+    def memory(self) -> Any:
+        """Return the states of the samples, which of them are still followed, and the last increment."""
+        return self.states, self.alive, self._last
+
+    def recall(self, memory: Any) -> None:
+        """Go on from what an earlier run had gathered."""
+        self.states, self.alive, self._last = memory
+
+    def _follow(self, name: str, strain: Array, increment: Increment) -> tuple[Array, Array]:
+        """Lead the samples of a zone on; return the distance of the stresses and the size of the first."""
+        sampled, old, alive = self.sampled[name], self.states[name], self.alive[name]
+        response = umat.update(sampled.second.material, sampled.second.directions, strain[sampled.ids], old)
+        self.states[name] = response.state
+        alive &= response.status == OK
+        first = increment.states[name].stress[sampled.within]
+        return norm(first - response.stress)[alive], norm(first)[alive]
+
+
+def error_columns(
+    case: BoundaryValueCase, model: Model, second: Callable[[str], Mapping[str, Substance]]
+) -> tuple[tuple[Column, ...], Discretisation | None]:
+    """Return the columns of the errors that a case asks for, and the estimate of the mesh's if it is among them.
+
+    Parameters
+    ----------
+    case : BoundaryValueCase
+        What is asked.
+    model : Model
+        What is run.
+    second : callable
+        Name of a rule -> substances by zone with that rule, of the zones that have contact directions.
+
+    Raises
+    ------
+    CaseError
+        If no material has contact directions whose error could be estimated.
+    """
+    said = case.errors
+    if said is None:
+        return (), None
+    mesh = Discretisation(model)
+    makers: dict[str, Callable[[], tuple[Callable[[Increment], Value], Keeper | None]]] = {
+        "equilibrium": lambda: (lambda increment: increment.residuals[-1] + increment.drag, None),
+        "integration": lambda: _kept(Integration(model)),
+        "discretisation": lambda: (mesh.value, None),
+        "directions": lambda: _kept(Directions(model, _seconds(case, second), said.samples)),
+    }
+    columns = tuple(Column(f"error_{name}", "-", "error", *makers[name]()) for name in said.estimate)
+    return columns, mesh if "discretisation" in said.estimate else None
+
+
+def _kept(error: Integration | Directions) -> tuple[Callable[[Increment], Value], Keeper]:
+    return error.value, error
+
+
+def _seconds(case: BoundaryValueCase, second: Callable[[str], Mapping[str, Substance]]) -> Mapping[str, Substance]:
+    assert case.errors is not None
+    found = second(case.errors.rule)
+    if not found:
+        raise CaseError(f"{case.path.name}: errors.estimate: no material here has contact directions")
+    return found
+
+
+def _stress(model: Model, increment: Increment) -> Array:
+    """Return the (npoints, 6) stress of all points."""
+    stress = np.empty((model.space.npoints, 6))
+    for name, zone in model.zones.items():
+        stress[zone.points] = increment.states[name].stress
+    return stress
+
+
+def _ids(zone: Zone, model: Model) -> Array:
+    """Return the numbers of the points of a zone."""
+    return np.arange(model.space.npoints)[zone.points]
+
+
+def _spread(model: Model, seconds: Mapping[str, Substance]) -> list[tuple[str, Zone]]:
+    return [(name, zone) for name, zone in model.zones.items() if name in seconds]
+
+
+def _sampled(zone: Zone, second: Substance, model: Model, samples: int) -> _Sampled:
+    """Return points of a zone that stand for equal parts of its volume."""
+    ids = _ids(zone, model)
+    volume = np.cumsum(model.space.weights[ids])
+    parts = min(samples, len(ids))
+    within = np.unique(np.searchsorted(volume, volume[-1] * (np.arange(parts) + 0.5) / parts))
+    return _Sampled(zone, second, ids[within], within)
+
+
+def _started(sampled: _Sampled) -> Any:
+    """Return the state of the samples before the run."""
+    second = sampled.second
+    return umat.initial_state(
+        second.material, second.directions, sampled.zone.state.stress[sampled.within], **second.needs
+    )

@@ -1,0 +1,110 @@
+"""A case on fabric laws from the case to the last row: its one drive makes a table, which is written block by block."""
+
+from functools import singledispatch
+from pathlib import Path
+from typing import Any
+
+from fabfem.case import CaseError, FabricCase
+from fabfem.case import fabric as said
+from fabfem.fabric_tests.drives import Measured, Value
+from fabfem.outcome import Description, Outcome, make_folder, short
+from fabfem.output.history import History
+from fabfem.output.interrupt import held_back
+from fabfem.output.report import Report
+from fabfem.restart import FRESH, Restart
+from fabfem.timing import Timer
+
+PHASES = ("laws", "output")
+OMITTED = ("no stress point: the laws do not act back on the stress and strain that they are given",)
+
+
+@singledispatch
+def measure(drive: Any, case: FabricCase) -> Measured:
+    """Return the table that a drive makes of the laws of a case; `CaseError` if it cannot be run."""
+    raise TypeError(f"{type(drive).__name__} drives nothing")
+
+
+@measure.register
+def _(drive: said.History | said.Loading, case: FabricCase) -> Measured:
+    from fabfem.fabric_tests import histories
+
+    return histories.measure(drive, case)
+
+
+@measure.register
+def _(drive: said.Probe, case: FabricCase) -> Measured:
+    from fabfem.fabric_tests import probes
+
+    return probes.measure(drive, case)
+
+
+@measure.register
+def _(drive: said.Surface, case: FabricCase) -> Measured:
+    from fabfem.fabric_tests import surfaces
+
+    return surfaces.measure(drive, case)
+
+
+@measure.register
+def _(drive: said.Contacts, case: FabricCase) -> Measured:
+    from fabfem.fabric_tests import contacts
+
+    return contacts.measure(drive, case)
+
+
+def describe(case: FabricCase) -> Description:
+    """Return what a case leaves out and what remains; `CaseError` if it cannot be run."""
+    return Description(OMITTED, measure(case.drive, case).remains)
+
+
+def run(case: FabricCase, folder: Path, quiet: bool, timer: Timer | None = None, restart: Restart = FRESH) -> Outcome:
+    """Run a case and write its results into a folder; see `fabfem.run.run_case`.
+
+    Such a run takes seconds and keeps no checkpoints: to resume it is to run it again, which gives the same.
+    """
+    if restart.branch is not None:
+        raise CaseError(f"{case.path.name}: scene.kind: a fabric scene keeps no state to branch from")
+    timer = timer or Timer(PHASES)
+    with timer.phase("laws"):
+        measured = measure(case.drive, case)
+    make_folder(folder)
+    for file in (*folder.glob("*.png"), folder / "history.csv"):
+        file.unlink(missing_ok=True)
+    history = History(folder / "history.csv", measured.headers)
+    report = Report(folder / "report.json", **_head(case, measured))
+    count, status = 0, "completed"
+    last: tuple[Value, ...] = ()
+    reasons: list[str] = []
+    try:
+        for block in measured.blocks:
+            with held_back():
+                for last in block.rows:
+                    history.write(last)
+                count += len(block.rows)
+                report.content["curves"].append(block.summary)
+            reasons += [block.reason] if block.reason else []
+        status = "stopped" if reasons else status
+    except KeyboardInterrupt:
+        status, reasons = "interrupted", ["interrupted; all curves that were done are kept"]
+    history.close()
+    reason = "; ".join(reasons)
+    report.end(status, reason)
+    report.write({**timer.spent, "total": timer.total()})
+    shown = tuple((header, short(value)) for header, value in zip(measured.headers, last, strict=False) if value != "")
+    return Outcome(status, reason, folder, count, shown, timer.total())
+
+
+def _head(case: FabricCase, measured: Measured) -> dict[str, Any]:
+    """Return what a report says before anything has run."""
+    units = case.unit_system
+    return {
+        "case": case.path.name,
+        "title": case.title,
+        "kind": case.scene.kind,
+        "units": {**units._asdict(), "stress": units.label("stress")},
+        "columns": {},
+        "scene": dict(measured.remains),
+        "omitted": list(OMITTED),
+        "resolved_case": case.model_dump(mode="json", exclude_none=True),
+        "curves": [],
+    }

@@ -1,0 +1,68 @@
+"""The stiffness of the unknowns, Tᵀ K T, from that of all dofs: by an index array or a sparse sum."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.sparse import csr_matrix
+
+from fabfem.fem.assembly import Pattern
+from fabfem.fem.supports import Constraints
+
+
+@dataclass(frozen=True)
+class Reduction:
+    """The matrix Tᵀ K T of a matrix K of known pattern, itself of one fixed pattern."""
+
+    pattern: Pattern
+    keep: np.ndarray
+    """Entries of K that stay as they are, in order, where nothing is tied."""
+    gather: csr_matrix | None = None
+    """(entries of Tᵀ K T, entries of K) how the one is summed from the other, where something is tied."""
+
+    def __call__(self, matrix: csr_matrix) -> csr_matrix:
+        """The reduced `matrix`."""
+        return self.pattern.matrix(matrix.data[self.keep] if self.gather is None else self.gather @ matrix.data)
+
+
+def reduction(pattern: Pattern, constraints: Constraints) -> Reduction:
+    """How to reduce matrices of `pattern`."""
+    return _combined(pattern, constraints) if len(constraints.tied) else _cut(pattern, constraints)
+
+
+def _cut(pattern: Pattern, constraints: Constraints) -> Reduction:
+    ndof = len(pattern.indptr) - 1
+    number = np.full(ndof, -1, np.int32)
+    number[constraints.free] = np.arange(len(constraints.free), dtype=np.int32)
+    rows = np.repeat(number, np.diff(pattern.indptr))
+    columns = number[pattern.indices]
+    keep = np.flatnonzero((rows >= 0) & (columns >= 0))
+    counts = np.bincount(rows[keep], minlength=len(constraints.free))
+    indptr = np.concatenate([[0], np.cumsum(counts)]).astype(np.int32)
+    return Reduction(Pattern(indptr, columns[keep], np.zeros((0, 0, 0), np.int32)), keep)
+
+
+def _combined(pattern: Pattern, constraints: Constraints) -> Reduction:
+    """The sum over all entries K_ij of T_ia T_jb, by entry (a, b)."""
+    ndof, nfree = len(constraints.motion), len(constraints.free)
+    row, column = np.nonzero(constraints.ties)
+    n = nfree + constraints.ties.shape[1]
+    i = np.concatenate([constraints.free, constraints.tied[row]])
+    a = np.concatenate([np.arange(nfree), nfree + column])
+    transfer = csr_matrix((np.concatenate([np.ones(nfree), constraints.ties[row, column]]), (i, a)), (ndof, n))
+    entry_row = np.repeat(np.arange(ndof), np.diff(pattern.indptr))
+    entry, left, first = _expanded(transfer, entry_row)
+    again, right, second = _expanded(transfer, pattern.indices[entry])
+    entry, key = entry[again], left[again].astype(np.int64) * n + right
+    keys, place = np.unique(key, return_inverse=True)
+    gather = csr_matrix((first[again] * second, (place, entry)), (len(keys), len(pattern.indices)))
+    indptr = np.searchsorted(keys, np.arange(n + 1) * n).astype(np.int32)
+    return Reduction(Pattern(indptr, (keys % n).astype(np.int32), np.zeros((0, 0, 0), np.int32)), entry[:0], gather)
+
+
+def _expanded(transfer: csr_matrix, dofs: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """For a list of dofs, each entry of each one's row of T: place in the list, unknown, value."""
+    counts = np.diff(transfer.indptr)[dofs]
+    where = np.repeat(np.arange(len(dofs)), counts)
+    begun = np.repeat(np.cumsum(counts) - counts, counts)
+    entries = np.repeat(transfer.indptr[dofs], counts) + np.arange(counts.sum()) - begun
+    return where, transfer.indices[entries], transfer.data[entries]

@@ -1,0 +1,1 @@
+"""A laboratory at one point: element tests from case files. Nothing of the finite-element side is imported."""

@@ -1,0 +1,139 @@
+"""An element test from the case to the last row: lead the specimen through its stages, write, say how it ended."""
+
+from collections.abc import Iterator
+from pathlib import Path as Folder
+from typing import Any
+
+import numpy as np
+
+from fabfem.case import CaseError, ElementCase
+from fabfem.case.element import Path, Probe
+from fabfem.failures import keep_stage
+from fabfem.identity import identity
+from fabfem.laboratory.record import PHASES, STANDING, Reached, Recorder, Written
+from fabfem.laboratory.specimen import Specimen, build
+from fabfem.laboratory.stages import End, path
+from fabfem.outcome import Description, Outcome, make_folder, short
+from fabfem.output.interrupt import held_back
+from fabfem.output.progress import Quiet, Terminal
+from fabfem.restart import FRESH, Restart, checkpoint_of
+from fabfem.timing import Timer
+from umat.mandel import Array
+
+
+def describe(case: ElementCase) -> Description:
+    """Return what a case leaves out and what remains, without running it.
+
+    Raises
+    ------
+    CaseError
+        If the case cannot be run.
+    """
+    specimen = build(case)
+    return Description(specimen.omitted, tuple(_remaining(specimen)))
+
+
+def _remaining(specimen: Specimen) -> Iterator[tuple[str, str]]:
+    case = specimen.case
+    for stage in case.stage:
+        what = f"{stage.directions} probes" if isinstance(stage, Probe) else f"{stage.increments} rows to each target"
+        yield f"stage {stage.name}", f"{stage.kind}, {what}"
+    if specimen.directions is not None:
+        yield "directions", str(len(specimen.directions))
+    yield "columns", str(len(specimen.columns))
+    yield "accuracy", f"curves to {100.0 * case.accuracy.curve:g} %"
+
+
+def run(
+    case: ElementCase, folder: Folder, quiet: bool, timer: Timer | None = None, restart: Restart = FRESH
+) -> Outcome:
+    """Run a case and write its results into a folder; see `fabfem.run.run_case`."""
+    timer = timer or Timer(PHASES)
+    with timer.phase("material"):
+        specimen = build(case)
+    known = identity(case)
+    begun = checkpoint_of(restart, folder, known)
+    start = begun.start if begun else Reached(0, specimen.state, np.zeros(6))
+    if restart.branch is not None:
+        _fits(specimen, start, restart)
+    make_folder(folder)
+    recorder = Recorder(
+        specimen, folder, timer, known, Written(**begun.written) if begun and restart.branch is None else None
+    )
+    with Quiet() if quiet else Terminal(len(case.stage)) as shown:
+        status, reason = _drive(specimen, recorder, shown, start)
+    last = tuple((header, short(value)) for header, value in zip(recorder.headers, recorder.values, strict=False))
+    return Outcome(status, reason, folder, recorder.count, last, timer.total())
+
+
+def _fits(specimen: Specimen, start: Reached, restart: Restart) -> None:
+    """Refuse a state that the material of a case does not keep, or that lies behind its last stage."""
+    shapes = [[part.shape for part in state] for state in (specimen.state, start.state)]
+    if type(start.state) is not type(specimen.state) or shapes[0] != shapes[1]:
+        raise CaseError(f"{specimen.case.path.name}: the material keeps another state than that in {restart.branch}")
+    if start.number > len(specimen.case.stage):
+        raise CaseError(f"{specimen.case.path.name}: the state in {restart.branch} is behind {start.number} stages")
+
+
+def replay(case: ElementCase, start: Any) -> tuple[tuple[str, float, str] | None, list[str]]:
+    """Return how the stage after a start fails (stage, fraction, reason), None if not; and the steps that it took."""
+    specimen, stage = build(case), case.stage[start.number]
+    if isinstance(stage, Probe):
+        return None, []
+    strain = start.strain if stage.keep_strain else np.zeros(6)
+    fraction = 0.0
+    for step in path(specimen, stage, start.state, strain):
+        if isinstance(step, End):
+            told = f"  {step.steps} steps, {step.work} evaluations of the material, error {step.error:.1e}"
+            return (stage.name, fraction, step.reason) if step.status == "stopped" else None, [told]
+        fraction = step.fraction
+    raise AssertionError("a path ends with its end")
+
+
+def _drive(specimen: Specimen, recorder: Recorder, shown: Quiet, start: Reached) -> tuple[str, str]:
+    """Go through the stages from a start and return the status and the reason."""
+    state, strain = start.state, start.strain
+    stages = specimen.case.stage
+    try:
+        for number, stage in enumerate(stages[start.number :], start.number):
+            with held_back():
+                recorder.keep(Reached(number, state, strain))
+            if isinstance(stage, Probe):
+                recorder.probe(stage, state)
+                continue
+            reached = Reached(number, state, strain)
+            strain = strain if stage.keep_strain else np.zeros(6)
+            state, strain, end = _path(specimen, stage, number, state, strain, recorder, shown)
+            if end.reason:
+                shown.say(f"{stage.name}: {end.status.replace('_', ' ')}: {end.reason}")
+            if end.status == "stopped":
+                fraction = float(recorder.values[STANDING.index("fraction [-]")])
+                keep_stage(specimen.case, recorder.folder, reached, (stage.name, fraction, end.reason))
+                sentence = f"stage {stage.name} stopped {end.reason}; all increments that converged are kept"
+                return recorder.end("stopped", sentence)
+    except KeyboardInterrupt:
+        return recorder.end("interrupted", "interrupted; all increments that converged are kept")
+    except OSError as error:
+        return "stopped", f"the results cannot be written: {error.strerror or error}"
+    recorder.keep(Reached(len(stages), state, strain))
+    return recorder.end("completed", "")
+
+
+def _path(
+    specimen: Specimen, stage: Path, number: int, state: Any, strain: Array, recorder: Recorder, shown: Quiet
+) -> tuple[Any, Array, End]:
+    """Follow the path of a stage and return the state and the strain that it ends with, and how."""
+    steps = path(specimen, stage, state, strain)
+    end = End("completed", "", 0, 0, 0.0)
+    while True:
+        with recorder.timer.phase("paths"):
+            step = next(steps)
+        if isinstance(step, End):
+            end = step
+            break
+        with held_back():
+            recorder.add(step)
+        state, strain = step.state, step.strain
+        shown.advance(stage.name, number + min(max(step.fraction, 0.0), 1.0), step.increment, 1)
+    recorder.end_path(stage, end)
+    return state, strain, end
