@@ -26,7 +26,6 @@ import shutil
 import signal
 import subprocess
 import sys
-import time
 import tomllib
 from collections import Counter
 from collections.abc import Callable, Iterator
@@ -169,13 +168,13 @@ def solved(file: Path, folder: Path, seconds: float) -> Judged:
         [sys.executable, "-m", "fabfem", "solve", "--quiet", str(file), "--out", str(folder)],
         **{"cwd": ROOT, "stderr": subprocess.PIPE, "text": True, "preexec_fn": bounded},
     )
-    try:
-        _, said = run.communicate(timeout=seconds)
-    except subprocess.TimeoutExpired:
+    said, wait = "", seconds
+    while run.poll() is None:  # again and again: one that meets the compiler may be lost
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            said = run.communicate(timeout=wait)[1]
+            break
         run.send_signal(signal.SIGINT)
-        time.sleep(1.0)
-        run.send_signal(signal.SIGINT)
-        _, said = run.communicate()
+        wait = 3.0
     known = {DONE: "completed", STOPPED: "stopped", BAD_INPUT: "refused", INTERRUPTED: "still going on"}
     if run.returncode not in known or "fault of the program" in said or "Traceback" in said:
         return Judged("fault", f"status {run.returncode}: {said.strip()[-300:]}")
