@@ -211,6 +211,20 @@ def test_a_full_disk(small_disk: Path, folder: Path, capsys: pytest.CaptureFixtu
     assert content(out) == content(folder / "whole")
 
 
+def test_a_disk_that_can_only_be_read(small_disk: Path, folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """A result that is there stays as it is."""
+    case, out = folder / "case.toml", small_disk / "out"
+    assert main(["solve", str(case), "--out", str(out), "--quiet"]) == 0
+    before = content(out)
+    subprocess.run(["mount", "-o", "remount,ro", str(small_disk)], check=True)
+    for there in (out, small_disk / "new"):
+        assert main(["solve", str(case), "--out", str(there), "--quiet"]) == BAD_INPUT
+        said = capsys.readouterr().err
+        assert "results cannot be written there (Read-only file system)" in said
+        assert said.count("\n") == 1
+    assert content(out) == before
+
+
 @pytest.mark.parametrize("case", ["element/drained_triaxial.toml", "fabric/contacts_2d.toml"])
 def test_a_full_disk_under_a_scene_without_mesh(
     case: str, small_disk: Path, capsys: pytest.CaptureFixture[str]
