@@ -176,6 +176,7 @@ def solved(file: Path, folder: Path, seconds: float) -> Judged:
         run.send_signal(signal.SIGINT)
         wait = 3.0
     known = {DONE: "completed", STOPPED: "stopped", BAD_INPUT: "refused", INTERRUPTED: "still going on"}
+    known[-signal.SIGINT] = "still going on"  # one more that arrived when the run was over
     if run.returncode not in known or "fault of the program" in said or "Traceback" in said:
         return Judged("fault", f"status {run.returncode}: {said.strip()[-300:]}")
     if (folder / "history.csv").is_file():
