@@ -135,6 +135,8 @@ def test_paraview_draws_the_view(result: Path, tmp_path: Path) -> None:
     for out in ("view.png", "view.pvsm"):
         command = ["xvfb-run", "-a", "pvpython", str(tmp_path / "moved" / "view.py"), str(tmp_path / out)]
         done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=500, check=False)
+        if "bad X server connection" in done.stderr:
+            pytest.skip("the X server was not there in time")
         assert done.returncode == 0, done.stderr
     picture = pyvista.read(tmp_path / "view.png")["PNGImage"]
     assert len(np.unique(picture.reshape(-1, picture.shape[-1]), axis=0)) > 500

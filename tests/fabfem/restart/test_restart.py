@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 from restart_kills import content, killed
-from restart_scenes import CYCLES, ELEMENTS, GROUND, MOHR, OTHER, SCENES, pushed, scene
+from restart_scenes import CYCLES, ELASTIC, ELEMENTS, GROUND, MOHR, SCENES, pushed, scene
 
 from fabfem.case import CaseError, read_case
 from fabfem.case.toml import write_toml
@@ -160,7 +160,7 @@ def test_what_a_branch_cannot_be(torn: Path) -> None:
     with pytest.raises(CaseError, match="stage 2, 'push', and the stages are ground"):
         run_case(written(torn, scene(MOHR) | {"stage": [GROUND]}), torn / "new", quiet=True, restart=restart)
     with pytest.raises(CaseError, match="keeps another state"):
-        run_case(written(torn, scene(OTHER["stiff"], pushed())), torn / "new", quiet=True, restart=restart)
+        run_case(written(torn, scene(ELASTIC, pushed())), torn / "new", quiet=True, restart=restart)
     with pytest.raises(CaseError, match="no checkpoint to branch from"):
         run_case(torn / "case.toml", torn / "new", quiet=True, restart=Restart(branch=torn / "nowhere"))
 
