@@ -18,7 +18,8 @@ sys.modules["fuzz_cases"] = fuzz_cases
 SPEC.loader.exec_module(fuzz_cases)
 
 
-def test_mutants_are_refused_or_are_cases(tmp_path: Path) -> None:
+def test_mutants_are_refused_or_are_cases(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(fuzz_cases, "PATIENCE", 600)  # the first may compile the material
     found = [(file.name, judged) for file, _, judged in fuzz_cases.fuzz(tmp_path, 150, seed=3)]
     assert [(name, judged.what) for name, judged in found if judged.verdict in ("fault", "long")] == []
     verdicts = Counter(judged.verdict for _, judged in found)
