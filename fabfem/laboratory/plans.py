@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fabfem.case import element as said
+from fabfem.case import paths as said
 from umat import legs
 from umat.mandel import FACTOR, IDENTITY, Array, from_tensor, rotation
 from umat.step import Course

@@ -11,8 +11,8 @@ import numpy as np
 
 import umat
 from fabfem.case import CaseError, ElementCase, suggest
-from fabfem.case.element import Path
 from fabfem.case.materials import ChangHicher
+from fabfem.case.paths import Path
 from fabfem.laboratory.columns import MEASURES, Column, Zeta, columns
 from fabfem.laboratory.plans import plan
 from fabfem.substance import MisfitError, Substance, Surroundings, substance

@@ -43,9 +43,9 @@ workers = 1
 
 [[sweep.parameter]]
 name = "test"
-at = ["initial.p", "material.rock.youngs_modulus"]
-each = true
-values = [[100.0, 1e4], [200.0, 2e4]]
+at = "initial.p"
+values = [100.0, 200.0]
+along = { "material.rock.youngs_modulus" = [1e4, 2e4] }
 labels = ["soft", "stiff"]
 """
 PICTURE = """
@@ -91,6 +91,16 @@ def test_values_of_several_places_go_together(swept, label, pressure, modulus):
     assert float(mine[0]["p [kPa]"]) == pressure
     assert float(mine[-1]["q [kPa]"]) == pytest.approx(0.01 * modulus, rel=1e-8)
     assert float(mine[-1]["gamma [-]"]) == pytest.approx(0.012, rel=1e-8)  # (1 + nu) times the axial strain
+
+
+def test_no_two_columns_have_one_name(tmp_path):
+    """A parameter p has the values asked for, a measure p those of the history: both are kept."""
+    file = written(tmp_path, CASE.replace('name = "test"', 'name = "p"'))
+    assert main(["sweep", str(file), "--out", str(tmp_path / "out"), "--quiet"]) == 0
+    found = rows(tmp_path / "out" / "sweep.csv")
+    assert {row["p"] for row in found} == {"soft", "stiff"}
+    assert float(found[0]["p_history [kPa]"]) == 100.0
+    assert "p [kPa]" not in found[0]
 
 
 def test_measured_curves_are_compared_up_to_the_end_of_the_run(swept):
