@@ -1,6 +1,6 @@
-"""Convergence of the gallery's curves: the runs at both ends of each sweep against runs ten times finer.
+"""Convergence of the gallery's curves: the case, or the runs at both ends of its sweep, against runs ten times finer.
 
-    python tests/benchmarks/gallery_convergence.py cases/element/zk_*.toml
+    python tests/benchmarks/gallery_convergence.py cases/element/*.toml
 
 prints, for each case and column, the largest distance of a curve from its fine one, at equal strain, over the largest
 value of the fine one. The fine runs have a tenth of ``accuracy.curve``.
@@ -31,10 +31,10 @@ def main(files: list[Path]) -> None:
 
 
 def distances(file: Path, folder: Path, pool: Pool) -> dict[str, float]:
-    """Return the largest relative distance of each column, over the first and last run of a sweep."""
+    """Return the largest relative distance of each column, over the first and last run of its sweep, or its own."""
     case = read_case(file)
-    every = choices(case.sweep.parameter)
-    ends = [every[0], every[-1]]
+    every = choices(case.sweep.parameter) if case.sweep else [()]
+    ends = list(dict.fromkeys([every[0], every[-1]]))
     finer = Setting("accuracy", ("accuracy.curve",), case.accuracy.curve / FINER)
     pairs: dict[Choice, Run] = {
         run.choice: run

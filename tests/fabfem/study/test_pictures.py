@@ -131,12 +131,12 @@ def test_a_picture_ends_where_it_is_told(swept):
 WRONG = {
     "there is no parameter 'tset'; did you mean 'test'": PICTURE + 'colour = "tset"\n',
     "x and y must be lists of one length": PICTURE.replace('["gamma", "p"]', '["gamma"]'),
-    "value 2 must be a list of 2": "",
+    "2 values, but 1 along with them for material.rock.youngs_modulus": "",
     "2 values and 1 labels": "",
     "draws whole histories": PICTURE,
 }
 CHANGES = {
-    "value 2 must be a list of 2": ("[200.0, 2e4]", "[200.0]"),
+    "2 values, but 1 along with them for material.rock.youngs_modulus": ("[1e4, 2e4]", "[1e4]"),
     "2 values and 1 labels": ('"soft", "stiff"', '"soft"'),
     "draws whole histories": ('rows = "all"', 'rows = "last"'),
 }
