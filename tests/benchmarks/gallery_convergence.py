@@ -45,13 +45,19 @@ def distances(file: Path, folder: Path, pool: Pool) -> dict[str, float]:
         coarse, fine = pairs[choice].history(), pairs[(*choice, finer)].history()
         for name in COLUMNS:
             if name in fine and coarse:
-                here = distance(*((run["fraction"], run[name]) for run in (coarse, fine)))
+                here = distance(*((_places(run), run[name]) for run in (coarse, fine)))
                 found[name] = max(found.get(name, 0.0), here)
     return found
 
 
-def distance(coarse: tuple[list[str], list[str]], fine: tuple[list[str], list[str]]) -> float:
-    """Return the largest distance of two curves, each (share of the target, values), over the largest of the second."""
+def _places(run: dict[str, list[str]]) -> list[float]:
+    """Return where the rows of a history are: twice the number of their stage, and the share of its target."""
+    stages = list(dict.fromkeys(run["stage"]))
+    return [2.0 * stages.index(stage) + float(part) for stage, part in zip(run["stage"], run["fraction"], strict=True)]
+
+
+def distance(coarse: tuple[list[float], list[str]], fine: tuple[list[float], list[str]]) -> float:
+    """Return the largest distance of two curves, each (place, values), over the largest value of the second."""
     (across, values), (places, truth) = (np.array(curve, dtype=float) for curve in (coarse, fine))
     reached = places <= across[-1]
     top = np.abs(truth).max()
