@@ -12,6 +12,7 @@ from pydantic import Field, model_validator
 from fabfem.case.table import Factors, Identifier, NotNegative, Positive, Table
 
 Six = Annotated[tuple[float, ...], Field(min_length=6, max_length=6, strict=False)]
+Plane = Annotated[tuple[Six, ...], Field(min_length=2, max_length=2, strict=False)]
 Fraction = Annotated[float, Field(ge=0, le=1)]
 Count = Annotated[int, Field(ge=1)]
 Components = dict[Literal["xx", "yy", "zz", "yz", "xz", "xy"], float]
@@ -198,8 +199,8 @@ class Probe(ElementStage):
     """What has the given size and direction; the response is the other one."""
     size: Positive
     """Norm of the probes [stress], or of strain."""
-    plane: Literal["triaxial", "biaxial", "deviatoric", "torsion"] = "triaxial"
-    """Plane of the directions."""
+    plane: Literal["triaxial", "biaxial", "deviatoric", "torsion"] | Plane = "triaxial"
+    """Plane of the directions, or two tensors xx, yy, zz, yz, xz, xy that span it."""
     directions: Count = 72
     """Number of directions, equally spaced."""
     increments: Count = 1
