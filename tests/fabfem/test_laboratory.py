@@ -220,6 +220,41 @@ def test_stress_control_passes_the_limit_of_mohr_coulomb(tmp_path: Path) -> None
     assert -slope == pytest.approx(2 * np.sin(np.radians(10)) / (1 - np.sin(np.radians(10))), rel=1e-4)
 
 
+UNDRAINED = {
+    # stage, largest and least stress where ψ = 0: σ1 = 3 σ3, p = 100 kPa
+    "compression": ({"kind": "triaxial", "axial_strain": 0.05}, 180.0, 60.0),
+    "extension": ({"kind": "triaxial", "axial_strain": -0.05}, 900.0 / 7.0, 300.0 / 7.0),
+    "true triaxial": ({"kind": "true_triaxial", "b": 0.5, "shear_strain": 0.05}, 150.0, 50.0),
+    "torsion": ({"kind": "hollow_cylinder", "alpha": 45.0, "b": 0.5, "shear_strain": 0.05}, 150.0, 50.0),
+    "turned torsion": (
+        {"kind": "hollow_cylinder", "alpha": 30.0, "b": 0.25, "shear_strain": 0.05},
+        1800 / 11,
+        600 / 11,
+    ),
+    "plane strain": ({"kind": "plane_strain", "axial_strain": 0.05}, 150.0, 50.0),
+    "simple shear": ({"kind": "simple_shear", "shear_strain": 0.05}, 150.0, 50.0),
+    "by stress": ({"kind": "hollow_cylinder", "alpha": 45.0, "b": 0.5, "q": 200.0}, 150.0, 50.0),
+}
+
+
+@pytest.mark.parametrize("dilation", [0.0, 10.0, 30.0])
+@pytest.mark.parametrize("name", UNDRAINED)
+def test_undrained_mohr_coulomb_goes_on_after_yield(name: str, dilation: float, tmp_path: Path) -> None:
+    """φ = 30°: with ψ = 0 the stress stays where p and the cone meet, with ψ > 0 it climbs along σ1 = 3 σ3."""
+    stage, major, minor = UNDRAINED[name]
+    material = {**COULOMB, "dilation_angle": dilation}
+    output = {"measures": ["p", "sigma_1", "sigma_3"]}
+    columns, report = run(tmp_path, material, {**stage, "drainage": "undrained", "increments": 10}, output=output)
+    ended = "beyond_peak" if dilation == 0.0 and "q" in stage else "completed"
+    assert report["stages"][0]["status"] == ended
+    if dilation == 0.0:
+        assert columns["sigma_1"][-1] == pytest.approx(major, rel=1e-7)
+        assert columns["sigma_3"][-1] == pytest.approx(minor, rel=1e-7)
+    else:
+        assert columns["sigma_1"][-1] == pytest.approx(3.0 * columns["sigma_3"][-1], rel=1e-7)
+        assert columns["p"][-1] > 110.0
+
+
 def test_stress_control_passes_the_peak_of_sand_on_the_curve_of_strain_control(tmp_path: Path) -> None:
     by_stress = {"kind": "triaxial", "drainage": "drained", "q": 350.0, "strain_limit": 0.15, "increments": 40}
     by_strain = {"kind": "triaxial", "drainage": "drained", "axial_strain": 0.15, "increments": 60}
