@@ -259,7 +259,8 @@ def test_the_tests_of_khayyer_are_108():
     case = read_case(ROOT / "cases" / "element" / "khayyer_13_15_states.toml")
     assert case.sweep is not None
     (parameter,) = case.sweep.parameter
-    wanted = [f"CI{'U' if how == 'undrained' else 'D'}-{p:.0f}-{e:.3f}" for p, e, how in parameter.values]
+    tests = zip(parameter.values, *parameter.along.values(), strict=True)
+    wanted = [f"CI{'U' if how == 'undrained' else 'D'}-{p:.0f}-{e:.3f}" for p, e, how in tests]
     assert list(parameter.labels or ()) == wanted
     assert [sum(name.startswith(kind) for name in wanted) for kind in ("CIU", "CID")] == [54, 54]
 
