@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 
+import numba
 import numpy as np
 from scipy.sparse import csr_matrix
 
@@ -21,7 +22,16 @@ class Reduction:
 
     def __call__(self, matrix: csr_matrix) -> csr_matrix:
         """The reduced `matrix`."""
-        return self.pattern.matrix(matrix.data[self.keep] if self.gather is None else self.gather @ matrix.data)
+        return self.pattern.matrix(_kept(matrix.data, self.keep) if self.gather is None else self.gather @ matrix.data)
+
+
+@numba.njit(cache=True, nogil=True)
+def _kept(data, keep):
+    """data[keep], without the copy of 4-byte indices as 8-byte ones that numpy makes."""
+    kept = np.empty(len(keep))
+    for i in range(len(keep)):
+        kept[i] = data[keep[i]]
+    return kept
 
 
 def reduction(pattern: Pattern, constraints: Constraints) -> Reduction:
@@ -35,7 +45,7 @@ def _cut(pattern: Pattern, constraints: Constraints) -> Reduction:
     number[constraints.free] = np.arange(len(constraints.free), dtype=np.int32)
     rows = np.repeat(number, np.diff(pattern.indptr))
     columns = number[pattern.indices]
-    keep = np.flatnonzero((rows >= 0) & (columns >= 0))
+    keep = np.flatnonzero((rows >= 0) & (columns >= 0)).astype(np.int32)
     counts = np.bincount(rows[keep], minlength=len(constraints.free))
     indptr = np.concatenate([[0], np.cumsum(counts)]).astype(np.int32)
     return Reduction(Pattern(indptr, columns[keep], np.zeros((0, 0, 0), np.int32)), keep)

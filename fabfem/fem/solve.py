@@ -154,7 +154,9 @@ def _all_stages(model: Model, systems: list[System], start: Start | None) -> Ite
                 yield Stopped(stage.name, index, 0.0, f"a zone cannot change its material: {error}", -1, (), {})
                 return
             place = Place(stage, index, number, time, now.force)
-        reached, number = yield from _course(place, system, now)
+        course = _course(place, system, now)
+        del now  # its arrays live as long as the course needs them
+        reached, number = yield from course
         if reached is None:
             return
         now = reached
@@ -195,7 +197,10 @@ def _through(place: Place, system: System, now: Equilibrium, load: Loading) -> C
             return None, number
         number, old = number + 1, now
         now, at = advanced(old, trial), _gone_on(stage, system, at, old, step, trial, pace)
-        yield increment(place, number, system, old, now, step, trial, system.timer.since(spent), at)
+        done = increment(place, number, system, old, now, step, trial, system.timer.since(spent), at)
+        del old, step, trial  # a tangent of all points is large
+        yield done
+        del done
     return now, number
 
 
