@@ -182,11 +182,12 @@ class PardisoBackend:
         self._pattern = (np.zeros(0), np.zeros(0))
         self._upper = np.zeros(0, int)
         self._matrix = csr_matrix((0, 0))
-        finalize(self, self._solver.free_memory, everything=True)
 
     def factor(self, matrix: csr_matrix, fresh: bool) -> None:
         """Factor, with a new analysis where the pattern is new or `fresh`."""
         known = _same(matrix, self._pattern)
+        if not len(self._pattern[0]):  # there is nothing to free before
+            finalize(self, self._solver.free_memory, everything=True)
         if not known:
             self._pattern = (matrix.indptr, matrix.indices)
             self._matrix = self._taken(matrix)
@@ -217,9 +218,9 @@ class PardisoBackend:
 
 _SETTINGS = {1: 1, 2: 2, 3: 0, 8: 0, 10: 8, 11: 0, 13: 0, 24: 1}
 """PARDISO's parameters, counted from 1: own values (1), nested dissection (2), no refinement but where a pivot was
-perturbed (8), by 1e-8 (10), no scaling (11) or matching (13), which would need a new analysis for every matrix; two levels
-of parallel work (24). With its own defaults a solve takes two to three times as long, for refinement that `DirectSolver`
-does where it is due."""
+perturbed (8), by 1e-8 (10), no scaling (11) or matching (13), which would need a new analysis for every matrix; two
+levels of parallel work (24). With its own defaults a solve takes two to three times as long, for refinement that
+`DirectSolver` does where it is due."""
 
 
 def make_solver(name: str = "auto", symmetric: bool = False) -> LinearSolver:
@@ -231,7 +232,7 @@ def make_solver(name: str = "auto", symmetric: bool = False) -> LinearSolver:
     if name == "auto":
         name = "pardiso" if installed else "superlu"
     if name not in ("superlu", "pardiso"):
-        raise ValueError(f"there is no linear solver '{name}'; there are auto, superlu, pardiso.")
+        raise ValueError(f"there is no linear solver '{name}'; there are auto, superlu, pardiso, multigrid.")
     if name == "pardiso" and not installed:
         raise ValueError("the linear solver 'pardiso' is not installed; pip install 'fabfem[fast]' brings it.")
     return DirectSolver(PardisoBackend(symmetric) if name == "pardiso" else SuperLUBackend())

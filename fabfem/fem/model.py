@@ -85,7 +85,10 @@ class Controls:
 
 @dataclass(frozen=True)
 class Model:
-    """Everything that `march` needs; `solver` is "auto", "superlu" or "pardiso"; `water` needs a `PorousSpace`."""
+    """Everything that `march` needs; `water` needs a `PorousSpace`.
+
+    `solver` is "auto", "superlu", "pardiso" or "multigrid".
+    """
 
     space: Space
     zones: Mapping[str, Zone]

@@ -19,7 +19,6 @@ from fabfem.fem.linear import norm
 from fabfem.fem.model import Controls, Refusal, elastic_tangents
 from fabfem.fem.trial import Equilibrium, System, Task, Trial, attempt, make_task, mechanical
 
-
 MARGIN = 0.1
 """What a correction with old factors must promise to leave, over the tolerance."""
 

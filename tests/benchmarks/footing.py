@@ -2,16 +2,17 @@
 
     python tests/benchmarks/footing.py --dofs 81k --material von_mises
 
-Plane strain, half the domain, 7.0 × 3.6 m, symmetric about x = 0; strip pressure on 0 ≤ x ≤ 1 in ten equal increments, no
-gravity; sides fixed in x, bottom fixed; squares of side 0.2 m / k cut along alternating diagonals into 6-node triangles
-with three points each. von_mises: E = 10 MPa, ν = 0.3, σ_y = 10√3 kPa, linear isotropic hardening 100 kPa, 50 kPa. ch:
-Toyoura sand with 37 directions on half the sphere (or the quarter that plane strain needs of them), isotropic 100 kPa,
-e = 0.8, 300 kPa. Newton to 1e-8 relative.
+Plane strain, half the domain, 7.0 × 3.6 m, symmetric about x = 0; strip pressure on 0 ≤ x ≤ 1 at the surface in ten
+equal increments, no gravity; sides fixed in x, bottom fixed; squares of side 0.2 m / k cut along alternating diagonals
+into 6-node triangles with three points each. solid-50k, solid-150k: a quarter of a square footing of 2 × 2 m on ground
+of 10 × 10 × 3 m, 10-node tetrahedra with four points. von_mises: E = 10 MPa, ν = 0.3, σ_y = 10√3 kPa, linear isotropic
+hardening 100 kPa, 50 kPa. ch: Toyoura sand, 37 directions on half the sphere, isotropic 100 kPa under a surcharge of as
+much, e = 0.8, the strip to 300 kPa. Newton to 1e-8 relative.
 
-The last line is a JSON object: `wall_s` from the first line of the mesh to the last increment, without imports and the
-compilation or loading of kernels, which a run of 60 dofs before it takes (`import_s`, `first_use_s`); `settlement_m` under
-the centre; `peak_mb` of the process, imports included (`import_mb`); `iterations`, the linear solves; `factorisations`;
-`phases_s`.
+The last line is a JSON object: `wall_s` and `cpu_s` from the first line of the mesh to the last increment, without
+imports and the compilation or loading of kernels, which a run of 60 dofs before it takes (`import_s`, `first_use_s`);
+`settlement_m` under the centre; `peak_mb` of the process, imports included (`import_mb`); `iterations`, the linear
+solves; `factorisations`, those with new factors; `phases_s`.
 """
 
 import json
@@ -24,8 +25,10 @@ import argparse  # noqa: E402
 import os  # noqa: E402
 from typing import Any, NamedTuple  # noqa: E402
 
-SIZES = {"5k": 1, "20k": 2, "81k": 4, "300k": 8}
-"""Cuts of the side of 0.2 m; 5,254, 20,586, 81,490 and 324,258 dofs."""
+SIZES = {k: (35 * n, 18 * n) for k, n in {"5k": 1, "20k": 2, "81k": 4, "300k": 8}.items()}
+SIZES |= {"solid-50k": (15, 15, 9), "solid-150k": (20, 20, 15)}
+"""Cells along each axis: 5,254, 20,586, 81,490 and 324,258 dofs; 54,777 and 156,333 of solids."""
+SMALL = {2: (7, 3), 3: (5, 5, 1)}
 PRESSURE = {"von_mises": 50.0, "ch": 300.0}
 EXACT = {"5k": 0.0270604, "20k": 0.0271602, "81k": 0.0271640}
 """Settlement under the centre on which the programs of the comparison agree, von Mises [m]."""
@@ -44,12 +47,12 @@ class Ran(NamedTuple):
     end: str
 
 
-def solve(cuts: int, material: str, solver: str, increments: int = 10) -> Ran:
-    """Return what the footing with squares of 0.2 m / `cuts` comes to."""
+def solve(cells: tuple[int, ...], material: str, solver: str, increments: int = 10) -> Ran:
+    """Return what the footing with so many cells comes to."""
     from fabfem.fem.solve import Stopped, march
 
     begin, used = time.perf_counter(), time.process_time()
-    model = footing(cuts, material, solver, increments)
+    model = footing(cells, material, solver, increments)
     made = time.perf_counter() - begin
     phases: dict[str, float] = {"mesh and space": made}
     iterations, reused, settlement, end = 0, 0, 0.0, ""
@@ -68,10 +71,8 @@ def solve(cuts: int, material: str, solver: str, increments: int = 10) -> Ran:
     )
 
 
-def footing(cuts: int, material: str, solver: str, increments: int) -> Any:
+def footing(cells: tuple[int, ...], material: str, solver: str, increments: int) -> Any:
     """Return the model."""
-    import numpy as np
-
     from fabfem.fem.box import box_mesh
     from fabfem.fem.kinematics import KINEMATICS
     from fabfem.fem.loads import Pressure
@@ -80,12 +81,14 @@ def footing(cuts: int, material: str, solver: str, increments: int) -> Any:
     from fabfem.fem.stages import Stage
     from fabfem.fem.supports import Support
 
-    counts = (35 * cuts, 18 * cuts) if cuts else (7, 3)
-    mesh = box_mesh("triangle6", counts, (0.0, -3.6), (7.0, 0.0))
+    solid = len(cells) == 3
+    lower, upper = ((0.0, 0.0, -3.0), (5.0, 5.0, 0.0)) if solid else ((0.0, -3.6), (7.0, 0.0))
+    mesh = box_mesh("tetra10" if solid else "triangle6", cells, lower, upper)
     top = mesh.boundary("top")
-    mesh.boundaries["strip"] = top[(mesh.points[top][:, :, 0] < 1.0 + 1e-9).all(axis=1)]
-    space = build_space(mesh, KINEMATICS["plane_strain"])
-    held = [("left", "x"), ("right", "x"), ("bottom", "x"), ("bottom", "y")]
+    mesh.boundaries["strip"] = top[(mesh.points[top][:, :, :-1] < 1.0 + 1e-9).all(axis=(1, 2))]
+    space = build_space(mesh, KINEMATICS["solid" if solid else "plane_strain"])
+    held = [("left", "x"), ("right", "x"), *(("bottom", axis) for axis in space.components)]
+    held += [("front", "y"), ("back", "y")] if solid else []
     loads, zone = [Pressure("strip", PRESSURE[material])], _zone(material, space)
     if material == "ch":  # the isotropic stress is in balance with a surcharge on the whole surface
         loads.append(Pressure("top", 100.0, 1.0, 1.0))
@@ -115,10 +118,10 @@ def _zone(material: str, space: Any) -> Any:
 
 
 def centre(space: Any) -> int:
-    """Return the vertical dof of the node under the centre."""
+    """Return the vertical dof under the centre."""
     import numpy as np
 
-    return 2 * int(np.argmin(np.abs(space.mesh.points).sum(axis=1))) + 1
+    return (1 + int(np.argmin(np.abs(space.mesh.points).sum(axis=1)))) * space.mesh.dim - 1
 
 
 def megabytes() -> float:
@@ -143,7 +146,7 @@ def main() -> None:
     if asked.threads:
         umat.set_threads(asked.threads)
     imported, memory = time.perf_counter() - BEGIN, megabytes()
-    solve(0, asked.material, asked.solver, 2)
+    solve(SMALL[len(SIZES[asked.dofs])], asked.material, asked.solver, 2)
     first = time.perf_counter() - BEGIN - imported
     ran = solve(SIZES[asked.dofs], asked.material, asked.solver, asked.increments)
     for name, seconds in ran.phases.items():
