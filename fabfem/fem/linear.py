@@ -10,11 +10,13 @@ from typing import Any, NamedTuple, Protocol
 from weakref import finalize
 
 import numpy as np
-from scipy.sparse import csc_matrix, csr_matrix, triu
+from scipy.sparse import csc_matrix, csr_matrix
 from scipy.sparse.linalg import SuperLU, splu
 
 POOR = 1e-10
-"""Relative residual above which a solution is refined once."""
+"""Relative residual above which a solution is refined."""
+REFINEMENTS = 3
+"""Times that it is, at most."""
 USELESS = 1e-6
 """Relative residual above which a solution is refused."""
 OVERFLOW = 1e14
@@ -79,7 +81,7 @@ class DirectSolver:
         self._try_factor(fresh=False)
 
     def solve(self, rhs: np.ndarray) -> Solution:
-        """Solve, refine once where poor, factor anew where still poor."""
+        """Solve, refine where poor, factor anew where still poor."""
         if not np.isfinite(rhs).all():
             return Solution(np.zeros_like(rhs), np.inf, False, "the right-hand side is not finite")
         if not rhs.any():
@@ -107,7 +109,9 @@ class DirectSolver:
             return np.zeros_like(rhs), np.inf
         x = self._backend.solve(rhs)
         residual = self._residual(x, rhs)
-        if residual > POOR and np.isfinite(residual):
+        for _ in range(REFINEMENTS):
+            if residual <= POOR or not np.isfinite(residual):
+                break
             better = x + self._backend.solve(rhs - self._matrix @ x)
             x, residual = min(((x, residual), (better, self._residual(better, rhs))), key=lambda pair: pair[1])
         return x, residual
@@ -166,7 +170,7 @@ class PardisoBackend:
 
     name = "pardiso"
 
-    def __init__(self, symmetric: bool = False) -> None:
+    def __init__(self, symmetric: bool = False, coupled: bool = False) -> None:
         # MKL's sums may differ from run to run unless it is told otherwise before it starts
         os.environ.setdefault("MKL_CBWR", "AUTO")
         # its threads would keep the processors busy for 0.2 s after each call, while the points need them
@@ -174,13 +178,14 @@ class PardisoBackend:
         from pypardiso import PyPardisoSolver
 
         self._solver = PyPardisoSolver(mtype=-2 if symmetric else 1)
-        for number, value in _SETTINGS.items():
+        settings = {} if coupled else _SETTINGS | ({} if symmetric else {10: 13})
+        for number, value in settings.items():
             self._solver.iparm[number - 1] = value
         # the next solver finds the library at once, instead of looking through all folders again (0.2 s)
         os.environ.setdefault("PYPARDISO_MKL_RT", self._solver.libmkl._name)
         self._symmetric = symmetric
         self._pattern = (np.zeros(0), np.zeros(0))
-        self._upper = np.zeros(0, int)
+        self._upper = np.zeros(0, bool)
         self._matrix = csr_matrix((0, 0))
 
     def factor(self, matrix: csr_matrix, fresh: bool) -> None:
@@ -199,12 +204,14 @@ class PardisoBackend:
         return self._call(33, rhs)
 
     def _taken(self, matrix: csr_matrix) -> csr_matrix:
-        """What PARDISO reads of a matrix: all, or its upper triangle, whose entries are then remembered."""
+        """What PARDISO reads of a matrix: all, or its upper triangle, whose place is then remembered."""
         if not self._symmetric:
             return csr_matrix((matrix.data, matrix.indices, matrix.indptr), shape=matrix.shape)
         rows = np.repeat(np.arange(matrix.shape[0], dtype=np.int32), np.diff(matrix.indptr))
-        self._upper = np.flatnonzero(matrix.indices >= rows).astype(np.int32)
-        return triu(matrix, format="csr")
+        self._upper = matrix.indices >= rows
+        indptr = np.concatenate([[0], np.cumsum(np.bincount(rows[self._upper], minlength=matrix.shape[0]))])
+        values = np.zeros(int(indptr[-1]))
+        return csr_matrix((values, matrix.indices[self._upper], indptr.astype(np.int32)), shape=matrix.shape)
 
     def _call(self, phase: int, rhs: np.ndarray) -> np.ndarray:
         from pypardiso.pardiso_wrapper import PyPardisoError
@@ -216,17 +223,18 @@ class PardisoBackend:
             raise ArithmeticError(f"PARDISO refused the stiffness matrix (error {error.value})") from error
 
 
-_SETTINGS = {1: 1, 2: 2, 3: 0, 8: 0, 10: 8, 11: 0, 13: 0, 24: 1}
+_SETTINGS = {1: 1, 2: 2, 3: 0, 8: 0, 10: 8, 11: 0, 13: 0, 21: 1, 24: 1}
 """PARDISO's parameters, counted from 1: own values (1), nested dissection (2), no refinement but where a pivot was
-perturbed (8), by 1e-8 (10), no scaling (11) or matching (13), which would need a new analysis for every matrix; two
-levels of parallel work (24). With its own defaults a solve takes two to three times as long, for refinement that
+perturbed (8), by 1e-8, or 1e-13 where unsymmetric (10), no scaling (11) or matching (13), which would need a new
+analysis for every matrix; pivots of two rows where symmetric (21), two levels of parallel work (24). With its own
+defaults, which equations with pore pressures need, a solve takes two to three times as long, for refinement that
 `DirectSolver` does where it is due."""
 
 
-def make_solver(name: str = "auto", symmetric: bool = False) -> LinearSolver:
+def make_solver(name: str = "auto", symmetric: bool = False, coupled: bool = False) -> LinearSolver:
     """The solver called `name`: "superlu", "pardiso", or "auto" for PARDISO where it is installed.
 
-    `symmetric` promises symmetric matrices. Raises ValueError for an unknown or missing solver.
+    `symmetric` promises symmetric matrices, `coupled` warns of unknowns of two kinds. Raises ValueError for an unknown or missing solver.
     """
     installed = find_spec("pypardiso") is not None
     if name == "auto":
@@ -235,4 +243,4 @@ def make_solver(name: str = "auto", symmetric: bool = False) -> LinearSolver:
         raise ValueError(f"there is no linear solver '{name}'; there are auto, superlu, pardiso, multigrid.")
     if name == "pardiso" and not installed:
         raise ValueError("the linear solver 'pardiso' is not installed; pip install 'fabfem[fast]' brings it.")
-    return DirectSolver(PardisoBackend(symmetric) if name == "pardiso" else SuperLUBackend())
+    return DirectSolver(PardisoBackend(symmetric, coupled) if name == "pardiso" else SuperLUBackend())

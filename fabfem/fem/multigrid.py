@@ -119,11 +119,14 @@ def cycle(near: Near) -> LinearOperator:
     from pyamg import smoothed_aggregation_solver
 
     smoother = ("chebyshev", {"degree": 2})
-    modes = np.zeros((near.size, near.modes.shape[1]))
-    modes[near.places] = near.modes
+    places, size, shape = near.places, near.size, near.matrix.shape
+    modes = np.zeros((size, near.modes.shape[1]))
+    modes[places] = near.modes
+    blocks = _padded(near).tobsr((near.block, near.block))
+    del near  # its matrix is large
     with _same_random_numbers():
         levels = smoothed_aggregation_solver(
-            _padded(near).tobsr((near.block, near.block)),
+            blocks,
             B=modes,
             strength=("symmetric", {"theta": 0.05}),
             improve_candidates=None,
@@ -134,11 +137,11 @@ def cycle(near: Near) -> LinearOperator:
     whole = levels.aspreconditioner()
 
     def apply(rhs: np.ndarray) -> np.ndarray:
-        padded = np.zeros(near.size)
-        padded[near.places] = rhs
-        return (whole @ padded)[near.places]
+        padded = np.zeros(size)
+        padded[places] = rhs
+        return (whole @ padded)[places]
 
-    return LinearOperator(near.matrix.shape, apply, dtype=float)
+    return LinearOperator(shape, apply, dtype=float)
 
 
 def _padded(near: Near) -> csr_matrix:

@@ -140,7 +140,7 @@ def _solver(
     """The linear solver of a stage: a direct one, or multigrid where that is asked for or worth while."""
     usual = model.water is None and worth_while(model.space, constraints)
     if model.solver != "multigrid" and not (model.solver == "auto" and usual):
-        return make_solver(model.solver, symmetric(zones))
+        return make_solver(model.solver, symmetric(zones), coupled=model.water is not None)
     if model.water is not None or find_spec("pyamg") is None:
         reason = "not for pore water" if model.water else "not installed; pip install pyamg brings it"
         raise ValueError(f"the linear solver 'multigrid' is {reason}.")
