@@ -234,7 +234,8 @@ defaults, which equations with pore pressures need, a solve takes two to three t
 def make_solver(name: str = "auto", symmetric: bool = False, coupled: bool = False) -> LinearSolver:
     """The solver called `name`: "superlu", "pardiso", or "auto" for PARDISO where it is installed.
 
-    `symmetric` promises symmetric matrices, `coupled` warns of unknowns of two kinds. Raises ValueError for an unknown or missing solver.
+    `symmetric` promises symmetric matrices, `coupled` warns of unknowns of two kinds. Raises ValueError for an unknown
+    or missing solver.
     """
     installed = find_spec("pypardiso") is not None
     if name == "auto":
