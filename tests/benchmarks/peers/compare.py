@@ -1,10 +1,11 @@
-"""The strip footing by fabfem and by its peers, in turn, and how fabfem's cost grows; the tables of docs/performance.md.
+"""The strip footing by fabfem and by its peers, in turn, and how its cost grows: tables of docs/performance.md.
 
     python tests/benchmarks/peers/compare.py --dofs 5k 20k 81k --repeats 3 --felupe /tmp/peers/bin/python
     python tests/benchmarks/peers/compare.py --growth --repeats 3
 
 Wall times are medians, processor times and memory the least. `--dolfinx` and `--felupe` name the interpreters that have
-them (dolfinx: /usr/bin/python3 after `apt install python3-dolfinx libopenblas0-pthread`); what is not there is left out.
+them (dolfinx: /usr/bin/python3 after `apt install python3-dolfinx libopenblas0-pthread`); what is not there is left
+out.
 `--growth` fits time and memory of 5k to 300k unknowns by a power, and prints the phases at 81k with one thread and two.
 """
 

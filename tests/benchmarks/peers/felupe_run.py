@@ -1,4 +1,4 @@
-"""The strip footing of the comparison by FElupe and PARDISO; `pip install felupe pypardiso` in an environment of its own.
+"""The strip footing of the comparison by FElupe and PARDISO; `pip install felupe pypardiso` in its own environment.
 
 python tests/benchmarks/peers/felupe_run.py 81k
 
