@@ -65,7 +65,7 @@ def solve(cuts, factorisation):
     correction = fem.Function(space)
     for increment in range(1, 11):
         step.x.array[:] = 0.0
-        while True:
+        for _ in range(30):
             increments = measured.eval(all_cells).reshape(npoints, 3)
             new, slipped, moduli = returned(old, plastic, increments)
             stress.x.array[:] = new[:, [0, 1, 3]].ravel()
@@ -86,6 +86,8 @@ def solve(cuts, factorisation):
             solver.solve(rhs, correction.vector)
             step.x.array[:] += correction.x.array
             iterations += 1
+        else:
+            raise SystemExit(f"no equilibrium in increment {increment}")
         old, plastic, total = new, slipped, total + step.x.array
     wall, used = time.perf_counter() - begin, time.process_time() - used
     where = np.argmin(np.abs(space.tabulate_dof_coordinates()).sum(axis=1))

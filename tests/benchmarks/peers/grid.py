@@ -39,7 +39,9 @@ def returned(stress: np.ndarray, plastic: np.ndarray, strain: np.ndarray) -> tup
     deviator = trial - trial[:, :3].mean(axis=1)[:, None] * unit
     size = np.sqrt(deviator**2 @ np.array([1.0, 1.0, 1.0, 2.0]))
     q = np.sqrt(1.5) * size
-    slip = np.maximum(q - YIELD - HARDENING * plastic, 0.0) / (3.0 * SHEAR + HARDENING)
+    excess = q - YIELD - HARDENING * plastic
+    excess[excess < 1e-9 * YIELD] = 0.0  # or round-off would decide which points begin an increment as plastic
+    slip = np.maximum(excess, 0.0) / (3.0 * SHEAR + HARDENING)
     shrink = 1.0 - 3.0 * SHEAR * slip / np.maximum(q, 1e-300)
     new = trial - (1.0 - shrink)[:, None] * deviator
     normal = (deviator / np.maximum(size, 1e-300)[:, None])[:, [0, 1, 3]]
