@@ -60,7 +60,7 @@ def compare(asked: argparse.Namespace) -> None:
             done = [row[at] for row in rows if row[at]]
             if not done:
                 continue
-            name = " ".join([done[0]["program"], done[0].get("material", ""), *command[5:]]).strip()
+            name = " ".join([done[0]["program"], done[0].get("material", ""), "superlu" * ("superlu" in command)])
             wall, processor = statistics.median(d["wall_s"] for d in done), min(d["cpu_s"] for d in done)
             cells = [name, done[0]["dofs"], f"{wall:.2f}", f"{processor:.2f}", f"{processor / least:.2f}"]
             cells += [f"{min(d['peak_mb'] for d in done):.0f}", done[0]["iterations"], f"{done[0]['settlement_m']:.7f}"]
