@@ -178,8 +178,7 @@ class PardisoBackend:
         from pypardiso import PyPardisoSolver
 
         self._solver = PyPardisoSolver(mtype=-2 if symmetric else 1)
-        settings = {} if coupled else _SETTINGS | ({} if symmetric else {10: 13})
-        for number, value in settings.items():
+        for number, value in ({} if coupled else _SETTINGS).items():
             self._solver.iparm[number - 1] = value
         # the next solver finds the library at once, instead of looking through all folders again (0.2 s)
         os.environ.setdefault("PYPARDISO_MKL_RT", self._solver.libmkl._name)
@@ -223,9 +222,9 @@ class PardisoBackend:
             raise ArithmeticError(f"PARDISO refused the stiffness matrix (error {error.value})") from error
 
 
-_SETTINGS = {1: 1, 2: 2, 3: 0, 8: 0, 10: 8, 11: 0, 13: 0, 21: 1, 24: 1}
+_SETTINGS = {1: 1, 2: 2, 3: 0, 8: 0, 10: 13, 11: 0, 13: 0, 21: 1, 24: 1}
 """PARDISO's parameters, counted from 1: own values (1), nested dissection (2), no refinement but where a pivot was
-perturbed (8), by 1e-8, or 1e-13 where unsymmetric (10), no scaling (11) or matching (13), which would need a new
+perturbed (8), by 1e-13 (10), no scaling (11) or matching (13), which would need a new
 analysis for every matrix; pivots of two rows where symmetric (21), two levels of parallel work (24). With its own
 defaults, which equations with pore pressures need, a solve takes two to three times as long, for refinement that
 `DirectSolver` does where it is due."""

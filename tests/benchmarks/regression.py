@@ -21,7 +21,7 @@ HERE = Path(__file__).parent
 def unpack(commit: str, folder: Path) -> Path:
     """Put the files of a commit into a folder."""
     folder.mkdir()
-    packed = subprocess.run(["git", "archive", commit], cwd=HERE, capture_output=True, check=True, shell=False)
+    packed = subprocess.run(["git", "archive", commit], cwd=HERE.parents[1], capture_output=True, check=True)
     subprocess.run(["tar", "-x", "-C", str(folder)], input=packed.stdout, check=True)
     return folder
 
