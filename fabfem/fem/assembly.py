@@ -19,7 +19,15 @@ class Pattern:
 
     indptr: np.ndarray
     indices: np.ndarray
-    positions: np.ndarray
+    dofs: np.ndarray
+    """(nel, m) rows of each element's matrix."""
+    offsets: np.ndarray
+    """(nel, m, m) place of each entry in its row, in two bytes where that is enough."""
+
+    @property
+    def positions(self) -> np.ndarray:
+        """(nel, m, m) place of each entry in `data`."""
+        return self.indptr[self.dofs][:, :, None] + self.offsets
 
     def matrix(self, data: np.ndarray) -> csr_matrix:
         """A matrix of this pattern that shares its index arrays."""
@@ -34,34 +42,34 @@ def find_pattern(dofs: np.ndarray, ndof: int) -> Pattern:
     graph = (incidence.T.astype(bool) @ incidence.astype(bool)).tocsr()
     graph.sort_indices()
     indptr, indices = graph.indptr.astype(np.int32), graph.indices.astype(np.int32)
-    return Pattern(indptr, indices, _positions(dofs, indptr, indices))
+    longest = int(np.diff(indptr).max(initial=0))
+    offsets = np.empty((nel, m, m), np.uint16 if longest <= np.iinfo(np.uint16).max else np.int32)
+    _fill_offsets(offsets, dofs, indptr, indices)
+    return Pattern(indptr, indices, dofs, offsets)
 
 
 def stiffness(space: Space, pattern: Pattern, tangent: np.ndarray) -> csr_matrix:
     """(ndof, ndof) stiffness of the tangents (npoints, 6, 6)."""
     data = np.zeros(len(pattern.indices))
     operator = (space.kinematics.active, *space.kinematics.sparse_operator)
-    _stiffness(data, tangent, space.weights, space.terms, pattern.positions, *operator)
+    _stiffness(data, tangent, space.weights, space.terms, pattern.indptr, pattern.dofs, pattern.offsets, *operator)
     return pattern.matrix(data)
 
 
 @numba.njit(cache=True, nogil=True)
-def _positions(dofs, indptr, indices):
+def _fill_offsets(offsets, dofs, indptr, indices):
     nel, m = dofs.shape
-    positions = np.empty((nel, m, m), np.int32)
     for e in range(nel):
         for i in range(m):
-            first, last = indptr[dofs[e, i]], indptr[dofs[e, i] + 1]
-            row = indices[first:last]
+            row = indices[indptr[dofs[e, i]] : indptr[dofs[e, i] + 1]]
             for j in range(m):
-                positions[e, i, j] = first + np.searchsorted(row, dofs[e, j])
-    return positions
+                offsets[e, i, j] = np.searchsorted(row, dofs[e, j])
 
 
 @numba.njit(cache=True, nogil=True)
-def _stiffness(data, tangent, weights, terms, positions, active, where, values):
+def _stiffness(data, tangent, weights, terms, indptr, dofs, offsets, active, where, values):
     nel, nq = terms.shape[:2]
-    m, nactive = positions.shape[1], len(active)
+    m, nactive = dofs.shape[1], len(active)
     b, cb, local = np.empty((nactive, m)), np.empty((nactive, m)), np.empty((m, m))
     for e in range(nel):
         local[:] = 0.0
@@ -71,8 +79,9 @@ def _stiffness(data, tangent, weights, terms, positions, active, where, values):
             _contract(cb, tangent[p], b, active, weights[p])
             _add_product(local, b, cb)
         for i in range(m):
+            first = indptr[dofs[e, i]]
             for j in range(m):
-                data[positions[e, i, j]] += local[i, j]
+                data[first + offsets[e, i, j]] += local[i, j]
 
 
 @numba.njit(cache=True, nogil=True)

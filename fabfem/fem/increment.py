@@ -84,6 +84,8 @@ class Increment:
     """Where a march can be taken up after it."""
     strength: float = 1.0
     """Factor by which the strength is divided."""
+    reused: int = 0
+    """Linear solves, of all, with factors that were there."""
     load_factor: float = 1.0
     """Share of the change of loads and motions of the stage that acts, where something else drives the stage."""
 
@@ -231,5 +233,6 @@ def increment(
         tangent=trial.batch.tangent,
         resume=Start(place.stage.name, place.stage_index, number, place.time, now, place.origin, progress),
         strength=place.stage.strength if strength is None else strength,
+        reused=step.solved.reused,
         load_factor=step.fraction if load_factor is None else load_factor,
     )

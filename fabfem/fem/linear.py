@@ -10,11 +10,13 @@ from typing import Any, NamedTuple, Protocol
 from weakref import finalize
 
 import numpy as np
-from scipy.sparse import csc_matrix, csr_matrix, triu
+from scipy.sparse import csc_matrix, csr_matrix
 from scipy.sparse.linalg import SuperLU, splu
 
 POOR = 1e-10
-"""Relative residual above which a solution is refined once."""
+"""Relative residual above which a solution is refined."""
+REFINEMENTS = 3
+"""Times that it is, at most."""
 USELESS = 1e-6
 """Relative residual above which a solution is refused."""
 OVERFLOW = 1e14
@@ -69,16 +71,17 @@ class DirectSolver:
         self.name = backend.name
         self._backend = backend
         self._matrix = csr_matrix((0, 0))
+        self._scale = np.zeros(0)
         self._failure = "no matrix was given"
 
     def factor(self, matrix: csr_matrix) -> None:
         """Factor `matrix`; a failure shows in the next `solve`."""
-        self._matrix = matrix
+        self._matrix, self._scale = matrix, np.sqrt(np.abs(matrix.diagonal()))
         self._failure = "" if np.isfinite(matrix.data).all() else "the stiffness matrix is not finite"
         self._try_factor(fresh=False)
 
     def solve(self, rhs: np.ndarray) -> Solution:
-        """Solve, refine once where poor, factor anew where still poor."""
+        """Solve, refine where poor, factor anew where still poor."""
         if not np.isfinite(rhs).all():
             return Solution(np.zeros_like(rhs), np.inf, False, "the right-hand side is not finite")
         if not rhs.any():
@@ -106,17 +109,17 @@ class DirectSolver:
             return np.zeros_like(rhs), np.inf
         x = self._backend.solve(rhs)
         residual = self._residual(x, rhs)
-        if residual > POOR and np.isfinite(residual):
+        for _ in range(REFINEMENTS):
+            if residual <= POOR or not np.isfinite(residual):
+                break
             better = x + self._backend.solve(rhs - self._matrix @ x)
             x, residual = min(((x, residual), (better, self._residual(better, rhs))), key=lambda pair: pair[1])
         return x, residual
 
     def _growth(self, x: np.ndarray, rhs: np.ndarray) -> float:
         """The solution over the right-hand side, both scaled as a unit diagonal would be: a bound of the condition."""
-        diagonal = np.abs(self._matrix.diagonal())
-        there = diagonal > 0.0
-        scale = np.sqrt(diagonal[there])
-        moved, pushed = norm(scale * x[there]), norm(rhs[there] / scale)
+        there = self._scale > 0.0
+        moved, pushed = norm(self._scale * x), norm(rhs[there] / self._scale[there])
         return moved / pushed if pushed > 0.0 else 0.0
 
     def _residual(self, x: np.ndarray, rhs: np.ndarray) -> float:
@@ -156,31 +159,41 @@ _SYMMETRIC_PATTERN: dict[str, Any] = {
 }
 
 
+def _same(matrix: csr_matrix, pattern: tuple[np.ndarray, np.ndarray]) -> bool:
+    """Whether a matrix has a pattern (indptr, indices); its arrays are compared only where they are not the same."""
+    pairs = zip((matrix.indptr, matrix.indices), pattern, strict=True)
+    return all(one is other or np.array_equal(one, other) for one, other in pairs)
+
+
 class PardisoBackend:
     """MKL PARDISO; the analysis is kept while the pattern stays."""
 
     name = "pardiso"
 
-    def __init__(self, symmetric: bool = False) -> None:
+    def __init__(self, symmetric: bool = False, coupled: bool = False) -> None:
         # MKL's sums may differ from run to run unless it is told otherwise before it starts
         os.environ.setdefault("MKL_CBWR", "AUTO")
+        # its threads would keep the processors busy for 0.2 s after each call, while the points need them
+        os.environ.setdefault("KMP_BLOCKTIME", "0")
         from pypardiso import PyPardisoSolver
 
         self._solver = PyPardisoSolver(mtype=-2 if symmetric else 1)
+        for number, value in ({} if coupled else _SETTINGS).items():
+            self._solver.iparm[number - 1] = value
         # the next solver finds the library at once, instead of looking through all folders again (0.2 s)
         os.environ.setdefault("PYPARDISO_MKL_RT", self._solver.libmkl._name)
         self._symmetric = symmetric
         self._pattern = (np.zeros(0), np.zeros(0))
-        self._upper = np.zeros(0, int)
+        self._upper = np.zeros(0, bool)
         self._matrix = csr_matrix((0, 0))
-        finalize(self, self._solver.free_memory, everything=True)
 
     def factor(self, matrix: csr_matrix, fresh: bool) -> None:
         """Factor, with a new analysis where the pattern is new or `fresh`."""
-        pattern = (matrix.indptr, matrix.indices)
-        known = all(map(np.array_equal, pattern, self._pattern))
+        known = _same(matrix, self._pattern)
+        if not len(self._pattern[0]):  # there is nothing to free before
+            finalize(self, self._solver.free_memory, everything=True)
         if not known:
-            self._pattern = pattern
+            self._pattern = (matrix.indptr, matrix.indices)
             self._matrix = self._taken(matrix)
         self._matrix.data = matrix.data[self._upper] if self._symmetric else matrix.data
         self._call(22 if known and not fresh else 12, np.zeros(matrix.shape[0]))
@@ -190,12 +203,14 @@ class PardisoBackend:
         return self._call(33, rhs)
 
     def _taken(self, matrix: csr_matrix) -> csr_matrix:
-        """What PARDISO reads of a matrix: all, or its upper triangle, whose entries are then remembered."""
+        """What PARDISO reads of a matrix: all, or its upper triangle, whose place is then remembered."""
         if not self._symmetric:
-            return matrix.copy()
-        rows = np.repeat(np.arange(matrix.shape[0]), np.diff(matrix.indptr))
-        self._upper = np.flatnonzero(matrix.indices >= rows)
-        return triu(matrix, format="csr")
+            return csr_matrix((matrix.data, matrix.indices, matrix.indptr), shape=matrix.shape)
+        rows = np.repeat(np.arange(matrix.shape[0], dtype=np.int32), np.diff(matrix.indptr))
+        self._upper = matrix.indices >= rows
+        indptr = np.concatenate([[0], np.cumsum(np.bincount(rows[self._upper], minlength=matrix.shape[0]))])
+        values = np.zeros(int(indptr[-1]))
+        return csr_matrix((values, matrix.indices[self._upper], indptr.astype(np.int32)), shape=matrix.shape)
 
     def _call(self, phase: int, rhs: np.ndarray) -> np.ndarray:
         from pypardiso.pardiso_wrapper import PyPardisoError
@@ -207,16 +222,25 @@ class PardisoBackend:
             raise ArithmeticError(f"PARDISO refused the stiffness matrix (error {error.value})") from error
 
 
-def make_solver(name: str = "auto", symmetric: bool = False) -> LinearSolver:
+_SETTINGS = {1: 1, 2: 2, 3: 0, 8: 0, 10: 13, 11: 0, 13: 0, 21: 1, 24: 1}
+"""PARDISO's parameters, counted from 1: own values (1), nested dissection (2), no refinement but where a pivot was
+perturbed (8), by 1e-13 (10), no scaling (11) or matching (13), which would need a new
+analysis for every matrix; pivots of two rows where symmetric (21), two levels of parallel work (24). With its own
+defaults, which equations with pore pressures need, a solve takes two to three times as long, for refinement that
+`DirectSolver` does where it is due."""
+
+
+def make_solver(name: str = "auto", symmetric: bool = False, coupled: bool = False) -> LinearSolver:
     """The solver called `name`: "superlu", "pardiso", or "auto" for PARDISO where it is installed.
 
-    `symmetric` promises symmetric matrices. Raises ValueError for an unknown or missing solver.
+    `symmetric` promises symmetric matrices, `coupled` warns of unknowns of two kinds. Raises ValueError for an unknown
+    or missing solver.
     """
     installed = find_spec("pypardiso") is not None
     if name == "auto":
         name = "pardiso" if installed else "superlu"
     if name not in ("superlu", "pardiso"):
-        raise ValueError(f"there is no linear solver '{name}'; there are auto, superlu, pardiso.")
+        raise ValueError(f"there is no linear solver '{name}'; there are auto, superlu, pardiso, multigrid.")
     if name == "pardiso" and not installed:
         raise ValueError("the linear solver 'pardiso' is not installed; pip install 'fabfem[fast]' brings it.")
-    return DirectSolver(PardisoBackend(symmetric) if name == "pardiso" else SuperLUBackend())
+    return DirectSolver(PardisoBackend(symmetric, coupled) if name == "pardiso" else SuperLUBackend())

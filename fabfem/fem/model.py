@@ -14,6 +14,7 @@ from fabfem.fem.pores import PoreWater
 from fabfem.fem.space import Space
 from fabfem.fem.stages import Stage
 from umat import elastic_tangent, symmetric_tangent, update, weakened
+from umat.interface import Response
 from umat.status import message
 
 States = dict[str, Any]
@@ -65,6 +66,8 @@ class Controls:
     extrapolate : bool
         Start from the last increment's displacement, where there is one in the stage, instead of a solve with the
         last tangent: a fifth to a quarter fewer solves.
+    reuse : bool
+        Make the last correction with the factors of the one before, where they promise balance; see `newton`.
     """
 
     tolerance: float = 1e-6
@@ -77,11 +80,15 @@ class Controls:
     viscosity: float = 0.0
     held: float = 0.0
     extrapolate: bool = True
+    reuse: bool = True
 
 
 @dataclass(frozen=True)
 class Model:
-    """Everything that `march` needs; `solver` is "auto", "superlu" or "pardiso"; `water` needs a `PorousSpace`."""
+    """Everything that `march` needs; `water` needs a `PorousSpace`.
+
+    `solver` is "auto", "superlu", "pardiso" or "multigrid".
+    """
 
     space: Space
     zones: Mapping[str, Zone]
@@ -163,28 +170,62 @@ def update_points(
 
     `may_hold` is the share of all points that may refuse and are held instead.
     """
-    npoints, held = len(strain_increment), 0
-    stress, tangent = np.zeros((npoints, 6)), np.zeros((npoints, 6, 6))
-    error, states = np.zeros(npoints), dict(old)
+    npoints, held, states = len(strain_increment), 0, dict(old)
+    whole = _room(zones, npoints)
     for name, zone in zones.items():
         response = update(zone.material, zone.directions, strain_increment[zone.points], old[name])
         refused = np.flatnonzero(response.status)
         held += len(refused)
         if held > may_hold * npoints:
-            first = refused[:1]
-            point, code = int(np.arange(npoints)[zone.points][first[0]]), int(response.status[first[0]])
-            strain, state = strain_increment[zone.points][first], type(old[name])(*(part[first] for part in old[name]))
-            alone = Refused(name, point, zone.material, zone.directions, state, strain, code)
-            return Refusal(f"{len(refused)} points of zone '{name}': {message(code)}", point, alone)
-        stress[zone.points], tangent[zone.points] = response.stress, response.tangent
-        if len(refused):
-            points = np.arange(npoints)[zone.points][refused]
-            tangent[points] = HELD_STIFFNESS * elastic_tangent(zone.material, old[name])[refused]
-        error[zone.points], states[name] = np.where(response.status, 0.0, response.error), response.state
-    bad = np.flatnonzero(~(np.isfinite(stress).all(axis=1) & np.isfinite(tangent).all(axis=(1, 2))))
+            return _refused(name, zone, strain_increment, old[name], response.status, refused)
+        values = _answer(zone, old[name], response, refused)
+        if whole:
+            for array, value in zip(whole, values, strict=True):
+                array[zone.points] = value
+        states[name] = response.state
+    stress, tangent, error = whole or values
+    bad = _not_finite(stress, tangent)
     if len(bad):
         return Refusal(f"{len(bad)} points have a stress or tangent that is not finite", int(bad[0]))
     return Batch(stress, tangent, states, int(error.argmax()), float(error.max()), error, held)
+
+
+def _room(zones: Mapping[str, Zone], npoints: int) -> tuple[np.ndarray, ...]:
+    """Zeros for the stress, tangent and error of all points; nothing where one zone has them all, in their order."""
+    if len(zones) == 1:
+        (points,) = (zone.points for zone in zones.values())
+        if isinstance(points, slice) and points.indices(npoints) == (0, npoints, 1):
+            return ()
+    return np.zeros((npoints, 6)), np.zeros((npoints, 6, 6)), np.zeros(npoints)
+
+
+def _answer(zone: Zone, old: Any, response: Response, refused: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Stress, tangent and error of the points of a zone; those that refused are held."""
+    if not len(refused):
+        return response.stress, response.tangent, response.error
+    tangent, error = response.tangent.copy(), response.error.copy()
+    tangent[refused], error[refused] = HELD_STIFFNESS * elastic_tangent(zone.material, old)[refused], 0.0
+    return response.stress, tangent, error
+
+
+def _refused(
+    name: str, zone: Zone, strain_increment: np.ndarray, old: Any, status: np.ndarray, refused: np.ndarray
+) -> Refusal:
+    """The refusal that names the first point of a zone that refused."""
+    first = refused[:1]
+    points = np.arange(len(strain_increment))[zone.points]
+    strain, state = strain_increment[points[first]], type(old)(*(part[first] for part in old))
+    point, code = int(points[first[0]]), int(status[first[0]])
+    alone = Refused(name, point, zone.material, zone.directions, state, strain, code)
+    return Refusal(f"{len(refused)} points of zone '{name}': {message(code)}", point, alone)
+
+
+def _not_finite(stress: np.ndarray, tangent: np.ndarray) -> np.ndarray:
+    """Points with a stress or tangent that is not finite; a finite sum has finite terms."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        if np.isfinite(stress.sum() + tangent.sum()):
+            return np.zeros(0, int)
+    return np.flatnonzero(~(np.isfinite(stress).all(axis=1) & np.isfinite(tangent).all(axis=(1, 2))))
 
 
 def elastic_tangents(zones: Mapping[str, Zone], states: States, npoints: int) -> np.ndarray:

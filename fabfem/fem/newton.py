@@ -3,10 +3,11 @@
 A correction that overshoots or makes the residual rise too much is shortened a few times; where that does not help, the
 elastic tangent is tried for one correction; then the increment is refused, with a sentence, and the caller makes it
 smaller. The first trial carries the last increment on, or comes from the tangent of the last equilibrium (elastic where
-a stage begins).
+a stage begins). The last correction is made with the factors of the one before where these promise balance: with r the
+residual and ρ its fall in the last correction, old factors leave about ρ r, new ones ρ² r: both are balance if ρ r is.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -18,6 +19,9 @@ from fabfem.fem.linear import norm
 from fabfem.fem.model import Controls, Refusal, elastic_tangents
 from fabfem.fem.trial import Equilibrium, System, Task, Trial, attempt, make_task, mechanical
 
+MARGIN = 0.1
+"""What a correction with old factors must promise to leave, over the tolerance."""
+
 
 class Solved(NamedTuple):
     """How an increment ended: in a trial that is in balance, or refused."""
@@ -27,6 +31,8 @@ class Solved(NamedTuple):
     """Linear solves."""
     residuals: tuple[float, ...]
     """Relative residual of every trial."""
+    reused: int = 0
+    """Linear solves, of all, with factors that were there."""
 
 
 def solve_increment(
@@ -38,7 +44,7 @@ def solve_increment(
     """
     task = make_task(system, old, load, size)
     residuals: list[float] = []
-    iterations = 0
+    iterations = reused = 0
     trial: Trial | Refusal = Refusal("") if guess is None else attempt(system, old, task, guess)
     if isinstance(trial, Refusal):
         trial = _predicted(system, old, task)
@@ -51,9 +57,29 @@ def solve_increment(
             reason = f"no equilibrium in {iterations} iterations (residual {trial.residual:.1e})"
             trial = Refusal(reason, worst_point(system, trial))
             break
-        trial = _corrected(system, old, task, trial)
         iterations += 1
-    return Solved(trial, iterations, tuple(residuals))
+        if promise_balance(system.controls, residuals):
+            again = _again(system, old, task, trial)
+            if again is not None:
+                trial, reused = again, reused + 1
+                continue
+        trial = _corrected(system, old, task, trial)
+    return Solved(trial, iterations, tuple(residuals), reused)
+
+
+def promise_balance(controls: Controls, residuals: Sequence[float]) -> bool:
+    """Whether another correction with the last factors will end in balance, if it contracts as the last one did."""
+    if len(residuals) < 2 or not controls.reuse:
+        return False
+    return residuals[-1] ** 2 <= MARGIN * controls.tolerance * residuals[-2]
+
+
+def _again(system: System, old: Equilibrium, task: Task, trial: Trial) -> Trial | None:
+    """The trial that a correction with the last factors leads to; None where it does not halve the residual."""
+    with system.timer.phase("linear_solve"):
+        solution = system.solver.solve(trial.unbalanced)
+    new = attempt(system, old, task, trial.step + system.constraints.spread(solution.x)) if solution.ok else None
+    return new if isinstance(new, Trial) and new.norm <= 0.5 * trial.norm else None
 
 
 def round_off(system: System, step: np.ndarray) -> float:
@@ -96,7 +122,8 @@ def _extended(system: System, old: Equilibrium, task: Task, tangent: np.ndarray)
     """The trial of one linear step from `old` to the new load and held dofs."""
     matrix = stiffness_of(system, task, tangent)
     start = old.force if task.start is None else task.start
-    correction = solved(system, matrix, system.constraints.collect(task.load - start - matrix @ task.motion))
+    rhs = system.constraints.collect(task.load - start - matrix @ task.motion)
+    correction = solved(system, matrix, rhs)
     if isinstance(correction, Refusal):
         return correction
     return attempt(system, old, task, task.motion + system.constraints.spread(correction))
@@ -161,6 +188,7 @@ def solved(system: System, matrix: csr_matrix, rhs: np.ndarray) -> np.ndarray | 
         return rhs
     with system.timer.phase("linear_solve"):
         reduced = system.reduce(matrix)
+        del matrix  # makes room for the factors where the caller has let go of it too
         system.solver.factor(reduced)
         solution = system.solver.solve(rhs)
         if solution.ok:

@@ -7,6 +7,7 @@ without one, the fraction of its loads and motions.
 
 from collections.abc import Generator, Iterator, Mapping
 from importlib import import_module
+from importlib.util import find_spec
 from typing import NamedTuple
 
 import numpy as np
@@ -23,16 +24,17 @@ from fabfem.fem.increment import (
     advanced,
     increment,
 )
-from fabfem.fem.linear import make_solver
+from fabfem.fem.linear import LinearSolver, make_solver
 from fabfem.fem.loads import Loading, loading
 from fabfem.fem.model import Controls, Model, Refusal, Zone, elastic_tangents, stress_of, symmetric, weaken
+from fabfem.fem.multigrid import MultigridSolver, Near, near, worth_while
 from fabfem.fem.newton import solve_increment
 from fabfem.fem.pores import Flowed, Pace, PorousSpace, Water, water_of
-from fabfem.fem.reduction import reduction
+from fabfem.fem.reduction import Reduction, reduction
 from fabfem.fem.space import Space
 from fabfem.fem.stages import ArcLength, DisplacementControl, Stage, StrengthSearch
 from fabfem.fem.start import Start, misfit
-from fabfem.fem.supports import constrain
+from fabfem.fem.supports import Constraints, constrain
 from fabfem.fem.trial import PHASES, Equilibrium, System, Trial
 from fabfem.timing import Timer
 
@@ -128,8 +130,26 @@ def _system(
     there = {name: zone for name, zone in zones.items() if name not in stage.absent}
     if not isinstance(stage.goal, StrengthSearch):
         there = weaken(there, stage.strength, stage.spared)
-    solver = make_solver(model.solver, symmetric(there))
+    solver = _solver(model, there, constraints, pattern, reduce)
     return System(model.space, there, model.controls, constraints, pattern, reduce, solver, timer, stiffest, water)
+
+
+def _solver(
+    model: Model, zones: Mapping[str, Zone], constraints: Constraints, pattern: Pattern, reduce: Reduction
+) -> LinearSolver:
+    """The linear solver of a stage: a direct one, or multigrid where that is asked for or worth while."""
+    usual = model.water is None and worth_while(model.space, constraints)
+    if model.solver != "multigrid" and not (model.solver == "auto" and usual):
+        return make_solver(model.solver, symmetric(zones), coupled=model.water is not None)
+    if model.water is not None or find_spec("pyamg") is None:
+        reason = "not for pore water" if model.water else "not installed; pip install pyamg brings it"
+        raise ValueError(f"the linear solver 'multigrid' is {reason}.")
+
+    def elastic() -> Near:
+        tangent = elastic_tangents(zones, model.states, model.space.npoints)
+        return near(model.space, constraints, reduce(stiffness(model.space, pattern, tangent)))
+
+    return MultigridSolver(elastic, make_solver("auto", symmetric(zones)), symmetric(zones))
 
 
 def _water(model: Model, stage: Stage, pattern: Pattern) -> Water | None:
@@ -154,7 +174,9 @@ def _all_stages(model: Model, systems: list[System], start: Start | None) -> Ite
                 yield Stopped(stage.name, index, 0.0, f"a zone cannot change its material: {error}", -1, (), {})
                 return
             place = Place(stage, index, number, time, now.force)
-        reached, number = yield from _course(place, system, now)
+        course = _course(place, system, now)
+        del now  # its arrays live as long as the course needs them
+        reached, number = yield from course
         if reached is None:
             return
         now = reached
@@ -195,7 +217,10 @@ def _through(place: Place, system: System, now: Equilibrium, load: Loading) -> C
             return None, number
         number, old = number + 1, now
         now, at = advanced(old, trial), _gone_on(stage, system, at, old, step, trial, pace)
-        yield increment(place, number, system, old, now, step, trial, system.timer.since(spent), at)
+        done = increment(place, number, system, old, now, step, trial, system.timer.since(spent), at)
+        del old, step, trial  # a tangent of all points is large
+        yield done
+        del done
     return now, number
 
 

@@ -63,7 +63,7 @@ def orders(residuals: tuple[float, ...]) -> list[float]:
 
 @pytest.mark.parametrize("name", MATERIALS)
 def test_observed_order(name: str) -> None:
-    steps = list(march(footing(name, tolerance=1e-12)))
+    steps = list(march(footing(name, tolerance=1e-12, reuse=False)))
     assert all(isinstance(step, Increment) for step in steps)
     assert any(len(step.residuals) > 4 for step in steps), "no plastic increment"
     last = [orders(step.residuals)[-1] for step in steps if orders(step.residuals)]
@@ -76,6 +76,17 @@ def test_observed_order(name: str) -> None:
 def test_the_first_guess_does_not_change_the_answer(name: str, extrapolate: bool) -> None:
     ends = [list(march(footing(name, tolerance=1e-10, extrapolate=e)))[-1] for e in (extrapolate, False)]
     np.testing.assert_allclose(ends[0].displacement, ends[1].displacement, atol=1e-9)
+
+
+@pytest.mark.parametrize("name", MATERIALS)
+def test_old_factors_save_work_and_do_not_change_the_answer(name: str) -> None:
+    runs = [list(march(footing(name, tolerance=1e-5, reuse=reuse))) for reuse in (True, False)]
+    solves = [sum(step.iterations for step in steps) for steps in runs]
+    assert solves[0] - sum(step.reused for step in runs[0]) < solves[1]
+    assert sum(step.reused for step in runs[0]) > 0
+    assert sum(step.reused for step in runs[1]) == 0
+    assert all(step.residuals[-1] <= 1e-5 for step in runs[0])
+    np.testing.assert_allclose(runs[0][-1].displacement, runs[1][-1].displacement, atol=1e-6)
 
 
 @pytest.mark.parametrize("name", MATERIALS)
