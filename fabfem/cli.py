@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from fabfem import __version__
+from fabfem.parallel.world import ended_together, first, launched
 
 DONE, NO_PICTURE, RED, BAD_INPUT, STOPPED, INTERRUPTED = 0, 1, 1, 2, 3, 130
 
@@ -25,7 +26,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """
     options = _parser().parse_args(arguments)
     try:
-        return options.command(options)
+        with ended_together(options.debug):
+            return options.command(options)
     except KeyboardInterrupt:
         return _fail("interrupted before the first increment", INTERRUPTED)
     except Exception as error:
@@ -46,7 +48,8 @@ def _explained(error: Exception) -> int:
 
 
 def _fail(message: str, status: int) -> int:
-    print(f"fabfem: {message}", file=sys.stderr)
+    if first():
+        print(f"fabfem: {message}", file=sys.stderr)
     return status
 
 
@@ -58,10 +61,11 @@ def _solve(options: argparse.Namespace) -> int:
     case = read_case(options.case)
     folder, restart = options.out or Path("results") / options.case.stem, Restart(options.resume, options.branch)
     outcome = run_case(case, folder, quiet=options.quiet, restart=restart)
-    if not options.quiet:
+    if first() and not options.quiet:
         print(outcome.summary())
     if outcome.status == "completed":
-        remember_cost(case, outcome.folder)
+        if not launched():
+            remember_cost(case, outcome.folder)
         return DONE
     return _fail(outcome.reason, INTERRUPTED if outcome.status == "interrupted" else STOPPED)
 

@@ -16,7 +16,7 @@ from fabfem.boundary_value.errors import FIELD, Discretisation, error_columns
 from fabfem.boundary_value.fields import known_fields, point_tensors
 from fabfem.boundary_value.ground import ground_stress, zones_of
 from fabfem.boundary_value.hollow_cylinder import hollow_cylinder_columns
-from fabfem.boundary_value.meshes import mesh_of, mesh_place
+from fabfem.boundary_value.meshes import hash_of, mesh_of, mesh_place
 from fabfem.boundary_value.omitted import left_out
 from fabfem.boundary_value.probes import Column, columns
 from fabfem.boundary_value.program import Scene, program
@@ -32,6 +32,7 @@ from fabfem.fem.solve import absent_dofs
 from fabfem.fem.space import Space, build_space
 from fabfem.fem.stages import Stage
 from fabfem.fem.supports import constrain
+from fabfem.parallel.world import communicator, share_cores, shared
 from fabfem.substance import MisfitError, Substance, Surroundings, substance
 
 
@@ -87,7 +88,7 @@ def build(case: BoundaryValueCase) -> Problem:
     with _blamed(case, "errors"):
         errors, mesh_error = error_columns(case, model, lambda rule: _with_rule(case, space, rule))
     diagnosed = conditioning_columns(model) if case.solver.diagnose else ()
-    if case.solver.threads:
+    if case.solver.threads and not shared(case):
         umat.set_threads(case.solver.threads)
     omitted = tuple(left_out(case, space, known, substances))
     return Problem(case, model, (*found, *errors, *diagnosed), mesh_error, omitted)
@@ -95,13 +96,28 @@ def build(case: BoundaryValueCase) -> Problem:
 
 def _space(case: BoundaryValueCase) -> Space:
     with _blamed(case, mesh_place(case)):
-        mesh = mesh_of(case)
+        mesh = _mesh(case)
     _check_names(case, mesh)
     kinematics = KINEMATICS[case.scene.kinematics]
     with _blamed(case, "mesh.points" if case.mesh.points else "scene.kinematics"):
         space = build_space(mesh, replace(kinematics, mean_dilation=_mean_dilation(case, mesh)), case.mesh.points)
     with _blamed(case, "water.excess"):
         return porous(space) if case.water is not None and case.water.excess else space
+
+
+def _mesh(case: BoundaryValueCase) -> Mesh:
+    """Return the mesh of a case, or this process's part of it where several share the run."""
+    if not shared(case):
+        return mesh_of(case)
+    with _blamed(case, "solver.linear"):
+        comm = communicator()
+    from fabfem.parallel.partition import divided
+    from fabfem.parallel.solver import Settings
+
+    settings = Settings(case.solver.linear == "multigrid", case.solver.petsc)
+    mesh = divided(lambda: mesh_of(case), hash_of, lambda mesh: _mean_dilation(case, mesh), comm, settings)
+    share_cores(mesh.ranks, case.solver.threads)
+    return mesh
 
 
 def _mean_dilation(case: BoundaryValueCase, mesh: Mesh) -> bool:

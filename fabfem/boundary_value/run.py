@@ -5,22 +5,20 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from fabfem.boundary_value.audit import audited
+from fabfem.boundary_value.meshes import hash_of
 from fabfem.boundary_value.omitted import memory, remaining
 from fabfem.boundary_value.price import price as price_of
 from fabfem.boundary_value.price import remember as remember_run
 from fabfem.boundary_value.problem import Problem, build
-from fabfem.boundary_value.record import PHASES, Recorder, Written, recall
+from fabfem.boundary_value.record import PHASES, Recorder, Written, place_of, recall
 from fabfem.boundary_value.safety import sentence
 from fabfem.case import BoundaryValueCase, CaseError
 from fabfem.fem.flow import UNDECIDED
 from fabfem.fem.increment import Collapsed, Increment, Stopped
-from fabfem.fem.mesh import Mesh
 from fabfem.fem.solve import march
 from fabfem.fem.start import misfit
-from fabfem.identity import hashed, identity
+from fabfem.identity import identity
 from fabfem.outcome import Description, Outcome, make_folder, short
 from fabfem.output.checkpoints import Checkpoint
 from fabfem.output.interrupt import held_back
@@ -66,13 +64,16 @@ def run(
     timer = timer or Timer(PHASES)
     with timer.phase("mesh"):
         problem = build(case)
-        known = identity(case, mesh=_hashed(problem.model.space.mesh))
+        known = identity(case, mesh=problem.model.space.mesh.ranks.told() or hash_of(problem.model.space.mesh))
         begun = checkpoint_of(restart, folder, known)
         steps = _steps(problem, begun, restart)
-    make_folder(folder)
+    ranks = problem.model.space.mesh.ranks
+    if ranks.rank == 0:
+        make_folder(folder)
+    ranks.sum(0)  # none writes before the folder is there
     recorder = _recorder(problem, folder, timer, known, begun, restart)
     stages = len(problem.model.stages)
-    with Quiet() if quiet else Terminal(stages) as shown:
+    with Quiet() if quiet or ranks.rank else Terminal(stages) as shown:
         status, reason = _drive(steps, recorder, shown)
     headers = [column.header for column in problem.columns]
     last = tuple((header, short(value)) for header, value in zip(headers, recorder.row, strict=False))
@@ -118,13 +119,6 @@ def _recorder(
     told = {"folder": str(restart.branch), "stage": start.stage, "increment": start.number}
     recorder.report.content["branch"] = told | {"hash": begun.identity["hash"]}
     return recorder
-
-
-def _hashed(mesh: Mesh) -> str:
-    """Return a hash of a mesh with its names."""
-    parts = (mesh.zones, mesh.boundaries)
-    named = [part for table in parts for name, ids in table.items() for part in (name.encode(), np.asarray(ids))]
-    return hashed(mesh.points, mesh.cells, mesh.cell_type.encode(), *named)
 
 
 def _drive(steps: Iterator[Increment | Stopped | Collapsed], recorder: Recorder, shown: Quiet) -> tuple[str, str]:
@@ -175,5 +169,5 @@ def _why(stopped: Stopped, problem: Problem) -> str:
 
 
 def _coordinates(problem: Problem, point: int) -> str:
-    places = ", ".join(f"{value:.4g}" for value in problem.model.space.points[point])
+    places = ", ".join(f"{value:.4g}" for value in place_of(problem.model.space, point))
     return f"point {point} ({places})"
