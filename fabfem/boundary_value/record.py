@@ -18,10 +18,11 @@ from fabfem.boundary_value.stability import localisation
 from fabfem.failures import clear as clear_failures
 from fabfem.failures import keep_points, keep_stage
 from fabfem.fem.increment import Collapsed, Cutback, Increment, Stopped
+from fabfem.fem.share import share_of
 from fabfem.fem.space import Space
 from fabfem.fem.start import Start
 from fabfem.output.checkpoints import PATTERN as CHECKPOINTS
-from fabfem.output.checkpoints import Checkpoint, Checkpoints
+from fabfem.output.checkpoints import SHARES, Checkpoint, Checkpoints
 from fabfem.output.history import History, Unheard
 from fabfem.output.report import Report
 from fabfem.output.vtu import FieldFiles, FieldPieces, Frame
@@ -86,7 +87,8 @@ class Recorder:
         self._last: Increment | None = None
         self._pending = then.pending
         said = problem.case.checkpoint
-        self._checkpoints = Checkpoints(folder, said.seconds, said.increments)
+        wait = lambda: self._ranks.sum(0)  # noqa: E731
+        self._checkpoints = Checkpoints(folder, said.seconds, said.increments, self._ranks.rank, wait)
         recall(problem.columns, then.keepers)
         timer.resume(then.wall_time, then.wall_time.get("total", 0.0))
 
@@ -161,7 +163,8 @@ class Recorder:
     def _keep(self) -> None:
         """Write a checkpoint of the last increment."""
         if self._last is not None:
-            moment = Checkpoint(self.identity, self._last.resume, self._written()._asdict())
+            share, number = share_of(self.problem.model.space), self._ranks.size
+            moment = Checkpoint(self.identity, self._last.resume, self._written()._asdict(), share, number)
             self._checkpoints.write(self._last.number, moment)
 
     def _written(self) -> Written:
@@ -256,7 +259,7 @@ def _clear(folder: Path, kept: Sequence[str], resumed: bool) -> None:
     if not resumed:
         clear_failures(folder)
     later = ("fields_*.vtu", "fields_*.pvtu", "strength_reduction.csv", "*.png", ".*.part")
-    for pattern in later if resumed else (*later, "fields.pvd", "report.json", CHECKPOINTS):
+    for pattern in later if resumed else (*later, "fields.pvd", "report.json", CHECKPOINTS, SHARES):
         for file in folder.glob(pattern):
             if not _belongs(file.name, kept):
                 file.unlink()

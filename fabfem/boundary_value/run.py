@@ -13,9 +13,11 @@ from fabfem.boundary_value.price import remember as remember_run
 from fabfem.boundary_value.problem import Problem, build
 from fabfem.boundary_value.record import PHASES, Recorder, Written, place_of, recall
 from fabfem.boundary_value.safety import sentence
+from fabfem.boundary_value.shares import dealt
 from fabfem.case import BoundaryValueCase, CaseError
 from fabfem.fem.flow import UNDECIDED
 from fabfem.fem.increment import Collapsed, Increment, Stopped
+from fabfem.fem.share import share_of
 from fabfem.fem.solve import march
 from fabfem.fem.start import misfit
 from fabfem.identity import identity
@@ -66,6 +68,8 @@ def run(
         problem = build(case)
         known = identity(case, mesh=problem.model.space.mesh.ranks.told() or hash_of(problem.model.space.mesh))
         begun = checkpoint_of(restart, folder, known)
+        if begun:
+            begun = dealt(begun, restart.branch or folder, share_of(problem.model.space))
         steps = _steps(problem, begun, restart)
     ranks = problem.model.space.mesh.ranks
     if ranks.rank == 0:

@@ -1,10 +1,15 @@
-"""What a report says of the processes that shared a run."""
+"""A run that several processes share: what its report says of them, and how one goes on from what others wrote."""
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from fabfem.case import CaseError
+from fabfem.fem.share import Share, carried
 from fabfem.fem.space import Space
+from fabfem.output.archive import ArchiveError
+from fabfem.output.checkpoints import Checkpoint, pieces
 from fabfem.output.report import peak_memory
 from fabfem.timing import Timer
 
@@ -32,3 +37,20 @@ def shares(space: Space, timer: Timer) -> dict[str, Any]:
     phases = ("elements", "material", "assembly")
     imbalance = {name: round(max(found[name]) / np.mean(found[name]), 3) for name in phases if any(found[name])}
     return {"ranks": {"number": ranks.size, "imbalance": imbalance, **found}}
+
+
+def dealt(found: Checkpoint, folder: Path, here: Share) -> Checkpoint:
+    """Return a checkpoint of `folder` as far as this process has the mesh, from the shares of those that wrote it.
+
+    Raises
+    ------
+    CaseError
+        If a share is missing or damaged.
+    """
+    if found.shares == 1 and (found.share is None or len(here.elements) == len(found.share.elements)):
+        return found
+    try:
+        both = carried(((piece.share, (piece.start, piece.written["pending"])) for piece in pieces(folder, found)), here)
+    except ArchiveError as error:
+        raise CaseError(f"{folder}: the checkpoint of {found.shares} processes cannot be read: {error}") from None
+    return found._replace(start=both[0], written=found.written | {"pending": both[1]})

@@ -70,6 +70,10 @@ class Alone:
         """The hash of the whole mesh, where this is a part; empty where it is not."""
         return ""
 
+    def numbers(self, nel: int, nnodes: int) -> tuple[np.ndarray, np.ndarray]:
+        """The numbers in the whole mesh of this rank's elements and nodes."""
+        return np.arange(nel), np.arange(nnodes)
+
     def point(self, number: int, nq: int) -> int:
         """The number in the whole mesh of a point of this rank, `nq` points to an element."""
         return number

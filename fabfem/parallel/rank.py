@@ -103,6 +103,10 @@ class Rank(Alone):
         """The hash of the whole mesh, where this is a part; empty where it is not."""
         return self.part.told
 
+    def numbers(self, nel: int, nnodes: int) -> tuple[np.ndarray, np.ndarray]:
+        """The numbers in the whole mesh of this rank's elements and nodes."""
+        return self.part.elements, self.part.nodes
+
     def point(self, number: int, nq: int) -> int:
         """The number in the whole mesh of a point of this rank, `nq` points to an element; negative ones stay."""
         return number if number < 0 else int(self.part.elements[number // nq]) * nq + number % nq
