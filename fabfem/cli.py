@@ -27,6 +27,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = _parser().parse_args(arguments)
     try:
         with ended_together(options.debug):
+            if launched() and options.command not in (_solve, _check):
+                return _fail("several processes share 'solve' and 'check', no other command", BAD_INPUT)
             return options.command(options)
     except KeyboardInterrupt:
         return _fail("interrupted before the first increment", INTERRUPTED)
@@ -59,6 +61,8 @@ def _solve(options: argparse.Namespace) -> int:
     from fabfem.run import remember_cost, run_case
 
     case = read_case(options.case)
+    if case.scene.kind != "boundary_value" and not first():
+        return DONE  # what has no mesh is done by one process
     folder, restart = options.out or Path("results") / options.case.stem, Restart(options.resume, options.branch)
     outcome = run_case(case, folder, quiet=options.quiet, restart=restart)
     if first() and not options.quiet:
@@ -77,7 +81,7 @@ def _check(options: argparse.Namespace) -> int:
 
     case = read_case(options.case)
     description = describe_case(case)
-    if not options.quiet:
+    if first() and not options.quiet:
         print(resolved(case))
         print("# What the scene leaves out:", *description.omitted, sep="\n#   ")
         cost = price_case(case) if options.price else ""

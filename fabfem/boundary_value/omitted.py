@@ -56,10 +56,8 @@ def remaining(model: Model) -> Iterator[tuple[str, str]]:
     for name, zone in model.zones.items():
         if zone.directions is not None:
             yield f"directions in {name}", str(len(zone.directions))
-    yield (
-        "memory",
-        f"about {space.mesh.ranks.largest(memory(model)):.0f} MiB{_each(space)}, of which {PROGRAM:.0f} MiB for the program itself",
-    )
+    most = f"about {space.mesh.ranks.largest(memory(model)):.0f} MiB{_each(space)}"
+    yield "memory", f"{most}, of which {PROGRAM:.0f} MiB for the program itself"
 
 
 def _each(space: Space) -> str:

@@ -50,7 +50,9 @@ def dealt(found: Checkpoint, folder: Path, here: Share) -> Checkpoint:
     if found.shares == 1 and (found.share is None or len(here.elements) == len(found.share.elements)):
         return found
     try:
-        both = carried(((piece.share, (piece.start, piece.written["pending"])) for piece in pieces(folder, found)), here)
+        both = carried(
+            ((piece.share, (piece.start, piece.written["pending"])) for piece in pieces(folder, found)), here
+        )
     except ArchiveError as error:
         raise CaseError(f"{folder}: the checkpoint of {found.shares} processes cannot be read: {error}") from None
     return found._replace(start=both[0], written=found.written | {"pending": both[1]})

@@ -33,7 +33,7 @@ class Solver(Table):
     """Share of the points that may keep their stress in an increment where the material refuses them."""
     linear: Literal["auto", "superlu", "pardiso", "mumps", "multigrid"] = "auto"
     """Linear solver; auto takes PARDISO where it is installed, and MUMPS where several processes share the run."""
-    petsc: dict[str, str | int | float | bool] = {}
+    petsc: dict[str, str | int | float | bool] = Field(default_factory=dict)
     """Options of PETSc, without the leading dash, where it solves: mumps, multigrid, or several processes."""
     threads: Annotated[int, Field(ge=0)] = 0
     """Threads for the material points; 0 takes the cores there are."""

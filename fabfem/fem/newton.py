@@ -95,9 +95,8 @@ def _extended(system: System, old: Equilibrium, task: Task, tangent: np.ndarray)
     """The trial of one linear step from `old` to the new load and held dofs."""
     matrix = stiffness_of(system, task, tangent)
     start = old.force if task.start is None else task.start
-    correction = solved(
-        system, matrix, system.constraints.collect(task.load - start - system.space.summed(matrix @ task.motion))
-    )
+    unbalanced = task.load - start - system.space.summed(matrix @ task.motion)
+    correction = solved(system, matrix, system.constraints.collect(unbalanced))
     if isinstance(correction, Refusal):
         return correction
     return attempt(system, old, task, task.motion + system.constraints.spread(correction))

@@ -164,7 +164,7 @@ class Water(NamedTuple):
         return matrix
 
     def start(self, unknowns: np.ndarray, size: float) -> np.ndarray:
-        """(ndof,) what the pressures at the start of an increment contribute to its forces and volumes, on this rank."""
+        """(ndof,) what pressures at the start of an increment add to its forces and volumes, in a rank's elements."""
         pressure = unknowns.copy()
         pressure[: self.nmotion] = 0.0
         force = self.coupling @ pressure

@@ -21,7 +21,7 @@ class Alone:
 
     rank = 0
     size = 1
-    spent: dict[str, float] = {}  # noqa: RUF012 one process has nothing to tell
+    spent: dict[str, float] = {}  # noqa: RUF012 nobody adds to it: one process has nothing to tell
     """What the solver and the exchange between ranks have come to."""
     patches: np.ndarray | None = None
     """(nel,) patch of each element, where it was found on a larger mesh."""
@@ -88,7 +88,7 @@ class Alone:
 
     def nearest(self, distance: np.ndarray) -> np.ndarray:
         """The node of the least distance, the first in the whole mesh; empty on a rank that does not have it."""
-        return distance.argmin(keepdims=True)
+        return np.array([distance.argmin()])
 
     def solver(self, constraints: Any, space: Any) -> Any:
         """A linear solver for the unknowns of a stage; None for those of one process."""

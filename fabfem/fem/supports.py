@@ -224,9 +224,9 @@ def _most(ranks: Alone, values: np.ndarray) -> float:
 
 def _short(ranks: Alone, rows: np.ndarray) -> np.ndarray:
     """A few rows with the same Gram matrix as the rows of all ranks together: the factor R of their QR."""
-    own = np.linalg.qr(rows, mode="r") if len(rows) else rows
+    own = np.asarray(np.linalg.qr(rows, mode="r")) if len(rows) else rows
     whole = ranks.stacked(own)
-    return np.linalg.qr(whole, mode="r") if len(whole) else whole
+    return np.asarray(np.linalg.qr(whole, mode="r")) if len(whole) else whole
 
 
 def _untied(constraints: Constraints, motions: np.ndarray) -> np.ndarray:

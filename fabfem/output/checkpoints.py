@@ -81,7 +81,6 @@ class Checkpoints:
         self._at, self._count, self._number = perf_counter(), 0, number
         self._cost = self._at - begun
 
-
     def _forget(self) -> None:
         """Remove all checkpoints but the last two, with their shares."""
         for file in sorted(self.folder.glob(PATTERN))[:-KEPT]:

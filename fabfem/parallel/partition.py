@@ -4,6 +4,7 @@ The first rank reads the mesh and sends each rank its part, one after another; t
 """
 
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -49,7 +50,7 @@ def divided(
         mesh, part = next(pieces)
         for rank, piece in enumerate(pieces, 1):
             comm.send(piece, dest=rank)
-    return Mesh(*mesh, ranks=Rank(comm, part, settings))
+    return replace(mesh, ranks=Rank(comm, part, settings))
 
 
 def _on_first(make: Callable[[], Any], comm: MPI.Comm) -> Any:
@@ -95,16 +96,17 @@ def _labels(mesh: Mesh, part_of: np.ndarray, together: bool, size: int) -> np.nd
     """Return the patch of each element, and let each patch follow its first element to one rank."""
     label = patches(mesh) if together else np.arange(len(mesh.cells))
     _, first = np.unique(label, return_index=True)
-    part_of[:] = part_of[first[label]]
-    if len(np.unique(part_of)) < size:
+    for proposed in (part_of, np.arange(len(label)) * size // len(label)):  # few elements: in their order
+        part_of[:] = proposed[first[label]]
+        if len(np.unique(part_of)) == size:
+            break
+    else:
         raise MeshError(f"{size} ranks are too many for this mesh: one of them gets no element.")
     return label
 
 
-def _pieces(
-    mesh: Mesh, part_of: np.ndarray, label: np.ndarray, told: str, size: int
-) -> Iterator[tuple[tuple[Any, ...], Part]]:
-    """Yield the arguments of each rank's mesh and its part."""
+def _pieces(mesh: Mesh, part_of: np.ndarray, label: np.ndarray, told: str, size: int) -> Iterator[tuple[Mesh, Part]]:
+    """Yield each rank's mesh and part."""
     owner = np.full(len(mesh.points), size)
     np.minimum.at(owner, mesh.cells, part_of[:, None])
     number = np.empty(len(owner), int)
@@ -124,7 +126,7 @@ def _pieces(
         }
         known = np.unique(label[elements], return_inverse=True)[1]
         part = Part(elements, nodes, int(mine.sum()), number[nodes[mine.sum() :]], known, touching, told)
-        yield (mesh.points[nodes], local[mesh.cells[elements]], mesh.cell_type, zones, sides), part
+        yield Mesh(mesh.points[nodes], local[mesh.cells[elements]], mesh.cell_type, zones, sides), part
 
 
 def _numbered(chosen: np.ndarray, n: int) -> np.ndarray:

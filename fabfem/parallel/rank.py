@@ -43,7 +43,7 @@ class Rank(Alone):
         self.comm, self.part, self.settings = comm, part, settings
         self.rank, self.size = comm.rank, comm.size
         self.patches = part.patches
-        self.spent = {"solves": 0, "linear_iterations": 0, "direct_instead": 0, "exchanged": 0}
+        self.spent: dict[str, float] = {"solves": 0, "linear_iterations": 0, "direct_instead": 0, "exchanged": 0}
         self._vectors: dict[int, PETSc.Vec] = {}
 
     def __reduce__(self) -> str:

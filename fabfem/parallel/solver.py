@@ -166,6 +166,7 @@ class PetscSolver:
         return x, float(residual) if np.isfinite(residual) else np.inf
 
     def _left(self, x: PETSc.Vec, b: PETSc.Vec) -> PETSc.Vec:
+        assert self._matrix is not None
         left = b.duplicate()
         self._matrix.mult(x, left)
         left.aypx(-1.0, b)
@@ -173,6 +174,7 @@ class PetscSolver:
 
     def _growth(self, x: PETSc.Vec, b: PETSc.Vec) -> float:
         """Return the solution over the right-hand side, both scaled as a unit diagonal would be."""
+        assert self._matrix is not None
         diagonal = np.abs(self._matrix.getDiagonal().array)
         there = diagonal > 0.0
         scale = np.sqrt(diagonal[there])

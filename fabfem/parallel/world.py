@@ -9,15 +9,12 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from time import monotonic, sleep
 from traceback import print_exc
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-if TYPE_CHECKING:
-    from fabfem.parallel.rank import Rank
-
-LAUNCHED = ("OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "PMIX_RANK", "MPI_LOCALNRANKS", "SLURM_STEP_NUM_TASKS")
-"""What Open MPI, MPICH, PRRTE, Intel's and SLURM's launchers set."""
-DISTRIBUTED = ("mumps", "multigrid")
-"""Linear solvers of PETSc, by the names that a case has for them."""
+LAUNCHED = ("OMPI_COMM_WORLD_SIZE", "PMI_SIZE", "PMIX_RANK")
+"""What the launchers of Open MPI, of MPICH and its kin, and of PMIx set."""
+ALONE, DISTRIBUTED = ("superlu", "pardiso"), ("mumps", "multigrid")
+"""Linear solvers of one process, and those of PETSc, by the names that a case has for them."""
 MISSING = "it needs PETSc: 'pip install fabfem[mpi]' after what docs/parallel.md says about the system's packages"
 PATIENCE = 3.0
 """Time that a rank which fails waits for the others to fail too [s]."""
@@ -33,14 +30,16 @@ def shared(case: Any) -> bool:
     return launched() or case.solver.linear in DISTRIBUTED
 
 
-def communicator() -> Any:
+def communicator(case: Any) -> Any:
     """Return the communicator of all processes, or of this one where no launcher started it.
 
     Raises
     ------
     ValueError
-        If petsc4py or mpi4py is not installed.
+        If the case names a solver that cannot be shared, or petsc4py or mpi4py is not installed.
     """
+    if launched() and case.solver.linear in ALONE:
+        raise ValueError(f"'{case.solver.linear}' is a solver of one process; several have {', '.join(DISTRIBUTED)}.")
     try:
         import petsc4py
         from mpi4py import MPI
@@ -59,13 +58,13 @@ def first() -> bool:
     return MPI.COMM_WORLD.rank == 0
 
 
-def share_cores(rank: "Rank", threads: int) -> None:
-    """Let the ranks of one machine share its cores, each `threads` of them or an equal part where that is 0."""
+def share_cores(comm: Any, threads: int) -> None:
+    """Let the processes of one machine share its cores, each `threads` of them or an equal part where that is 0."""
     from mpi4py import MPI
 
     import umat
 
-    here = rank.comm.Split_type(MPI.COMM_TYPE_SHARED).size
+    here = comm.Split_type(MPI.COMM_TYPE_SHARED).size
     umat.set_threads(threads or max(1, (os.cpu_count() or 1) // here))
 
 
