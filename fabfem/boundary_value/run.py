@@ -13,7 +13,7 @@ from fabfem.boundary_value.price import remember as remember_run
 from fabfem.boundary_value.problem import Problem, build
 from fabfem.boundary_value.record import PHASES, Recorder, Written, place_of, recall
 from fabfem.boundary_value.safety import sentence
-from fabfem.boundary_value.shares import dealt
+from fabfem.boundary_value.shares import blame, dealt
 from fabfem.case import BoundaryValueCase, CaseError
 from fabfem.fem.flow import UNDECIDED
 from fabfem.fem.increment import Collapsed, Increment, Stopped
@@ -127,7 +127,7 @@ def _recorder(
 
 def _drive(steps: Iterator[Increment | Stopped | Collapsed], recorder: Recorder, shown: Quiet) -> tuple[str, str]:
     """March to the end and return the status and the reason."""
-    case = recorder.problem.case
+    case, ranks = recorder.problem.case, recorder.problem.model.space.mesh.ranks
     try:
         for step in steps:
             if isinstance(step, Stopped):
@@ -140,11 +140,21 @@ def _drive(steps: Iterator[Increment | Stopped | Collapsed], recorder: Recorder,
             if audited(recorder.problem, step):
                 shown.say(_audit(recorder.report.content["audit"], case.units.length))
             shown.advance(step.stage, step.stage_index + step.fraction, step.number, step.iterations)
-    except KeyboardInterrupt:
-        return recorder.end("interrupted", "interrupted; all increments that converged are kept")
-    except OSError as error:
-        return "stopped", f"the results cannot be written: {error.strerror or error}"
+    except (KeyboardInterrupt, Exception) as error:
+        if ranks.size > 1:  # the others wait for this rank, and do not know
+            blame(recorder.folder, ranks.rank, error)
+            raise
+        return _interrupted(recorder, error)
     return recorder.end("completed", "")
+
+
+def _interrupted(recorder: Recorder, error: BaseException) -> tuple[str, str]:
+    """Return how a run ends that was interrupted or whose results cannot be written; raise what is neither."""
+    if isinstance(error, KeyboardInterrupt):
+        return recorder.end("interrupted", "interrupted; all increments that converged are kept")
+    if isinstance(error, OSError):
+        return "stopped", f"the results cannot be written: {error.strerror or error}"
+    raise error
 
 
 def _found(end: Collapsed, recorder: Recorder, shown: Quiet) -> tuple[str, str]:

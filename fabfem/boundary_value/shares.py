@@ -1,5 +1,6 @@
 """A run that several processes share: what its report says of them, and how one goes on from what others wrote."""
 
+import json
 from pathlib import Path
 from typing import Any
 
@@ -9,6 +10,7 @@ from fabfem.case import CaseError
 from fabfem.fem.share import Share, carried
 from fabfem.fem.space import Space
 from fabfem.output.archive import ArchiveError
+from fabfem.output.atomic import write_atomic
 from fabfem.output.checkpoints import Checkpoint, pieces
 from fabfem.output.report import peak_memory
 from fabfem.timing import Timer
@@ -37,6 +39,15 @@ def shares(space: Space, timer: Timer) -> dict[str, Any]:
     phases = ("elements", "material", "assembly")
     imbalance = {name: round(max(found[name]) / np.mean(found[name]), 3) for name in phases if any(found[name])}
     return {"ranks": {"number": ranks.size, "imbalance": imbalance, **found}}
+
+
+def blame(folder: Path, rank: int, error: BaseException) -> None:
+    """Write into the report that a rank has failed, and of what; the first rank may not come to it any more."""
+    path = folder / "report.json"
+    if path.is_file():
+        content = json.loads(path.read_text(encoding="utf-8"))
+        content |= {"status": "stopped", "reason": f"rank {rank} failed: {error or type(error).__name__}"}
+        write_atomic(path, json.dumps(content, indent=1) + "\n")
 
 
 def dealt(found: Checkpoint, folder: Path, here: Share) -> Checkpoint:

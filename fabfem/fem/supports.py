@@ -190,7 +190,7 @@ def _follow(
     for name in body.motion:
         if name not in names:
             raise ValueError(f"a rigid body has no motion '{name}' here; it has {', '.join(names)}.")
-    also_held = np.array([dof in moved for dof in dofs.tolist()])
+    also_held = np.array([dof in moved for dof in dofs.tolist()], bool)
     asked = np.array([names.index(name) for name in body.motion], dtype=int)
     equations = np.concatenate([modes[also_held], np.eye(len(names))[asked]])
     values = np.array([*(moved[dof] for dof in dofs[also_held].tolist()), *body.motion.values()])

@@ -40,6 +40,8 @@ def communicator(case: Any) -> Any:
     """
     if launched() and case.solver.linear in ALONE:
         raise ValueError(f"'{case.solver.linear}' is a solver of one process; several have {', '.join(DISTRIBUTED)}.")
+    for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS") if launched() else ():
+        os.environ.setdefault(name, "1")  # a rank is a process for each core already
     try:
         import petsc4py
         from mpi4py import MPI
