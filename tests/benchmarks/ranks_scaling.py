@@ -1,8 +1,8 @@
 """Strong and weak scaling of a three-dimensional footing on shared processes: the second table of docs/parallel.md.
 
 ``python tests/benchmarks/ranks_scaling.py [--linear multigrid mumps] [--unknowns 50000 100000] [--ranks 1 2]`` settles
-a square footing on Toyoura sand, a quarter of the scene, by a tenth of a millimetre in one increment after the
-geostatic stage, and prints a row for each run: wall time by phase (the largest of a rank), the processor time of a rank
+a square footing on Toyoura sand, a quarter of the scene, by a millimetre in two increments after the geostatic
+stage, and prints a row for each run: wall time by phase (the largest of a rank), the processor time of a rank
 in the material, memory, iterations and communication. One number of unknowns with several numbers of ranks is strong
 scaling, numbers in proportion are weak scaling. The load of the machine stands in the last column.
 """
@@ -61,8 +61,8 @@ pressure = [{{ boundary = ["surface", "footing"], value = 1.0 }}]
 [[stage]]
 name = "settlement"
 kind = "load"
-displacement = [{{ boundary = "footing", x = 0.0, y = 0.0, z = -0.0001 }}]
-increments = {{ initial = 1.0, minimum = 1e-3, maximum = 1.0 }}
+displacement = [{{ boundary = "footing", x = 0.0, y = 0.0, z = -0.001 }}]
+increments = {{ initial = 0.5, minimum = 1e-3, maximum = 0.5 }}
 [[reaction]]
 name = "footing_force"
 boundary = "footing"

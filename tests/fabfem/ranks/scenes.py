@@ -72,6 +72,7 @@ SOLID = (
     DRY.replace("plane_strain", "solid").replace('"quad"', '"hexahedron"').replace("[6, 4]", "[4, 3, 3]")
     .replace("lower = [0.0, 0.0], upper = [3.0, 2.0]", "lower = [0.0, 0.0, 0.0], upper = [3.0, 2.0, 2.0]")
     .replace('fix = ["x", "y"]', 'fix = ["x", "y", "z"]').replace("point = [3.0, 2.0]", "point = [3.0, 2.0, 2.0]")
+    .replace('component = "y"', 'component = "z"')
     .replace("[[reaction]]", '[[support]]\nboundary = ["front", "back"]\nfix = ["y"]\n[[reaction]]')
 )  # fmt: skip
 WET = (
