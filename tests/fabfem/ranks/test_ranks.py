@@ -117,7 +117,7 @@ def test_the_pieces_are_opened_as_one(alone: Path, shared: Path) -> None:
     nearest = other.find_closest_point
     order = [nearest(point) for point in one.points]
     for name in ("displacement", "stress", "p"):
-        np.testing.assert_allclose(other[name][order], one[name], rtol=1e-5, atol=1e-5)
+        np.testing.assert_allclose(other.point_data[name][order], one.point_data[name], rtol=1e-5, atol=1e-5)
 
 
 @needs_mpi
