@@ -75,7 +75,7 @@ def increment(law: Any, inputs: Array) -> Array:
         block = inputs[first : first + LANES]
         rows, found = np.zeros((INPUTS, LANES)), np.zeros((6, LANES))
         rows[:, : len(block)] = block.T
-        increments(law, rows.reshape(-1), found.reshape(-1), len(block))
+        increments(law, rows.reshape(-1), found.reshape(-1))
         out[first : first + LANES] = found[:, : len(block)].T
     return out
 

@@ -6,14 +6,13 @@ Medians of five in one run, seconds. The tangent is unsymmetric and differs from
 """
 
 import argparse
-import statistics
-import time
 from collections.abc import Callable
 from importlib.util import find_spec
 
 import numpy as np
 import skfem
 from scipy.sparse import csr_matrix
+from timing import median_time
 
 from fabfem.fem.assembly import find_pattern, stiffness
 from fabfem.fem.box import box_mesh
@@ -23,17 +22,6 @@ from fabfem.fem.reduction import reduction
 from fabfem.fem.space import Space, build_space
 from fabfem.fem.supports import Support, constrain
 from umat import Elastic, elastic_tangent, initial_state
-
-
-def seconds(run: Callable[[], object], repeats: int = 5) -> float:
-    """Return the median time of `run`, after once."""
-    run()
-    times = []
-    for _ in range(repeats):
-        begin = time.perf_counter()
-        run()
-        times.append(time.perf_counter() - begin)
-    return statistics.median(times)
 
 
 def tangents(space: Space) -> np.ndarray:
@@ -72,7 +60,7 @@ def main() -> None:
     theirs, ours = by_form(space, tangent), stiffness(space, pattern, tangent)
     assert abs(norm(theirs().data) / norm(ours.data) - 1.0) < 1e-12
     print(f"{len(space.mesh.cells)} triangles, {space.ndof} unknowns\n\n| | seconds | ratio |\n|---|---|---|")
-    fast, slow = seconds(lambda: stiffness(space, pattern, tangent)), seconds(theirs, 3)
+    fast, slow = median_time(lambda: stiffness(space, pattern, tangent)), median_time(theirs, 3)
     print(f"| stiffness on the fixed pattern | {fast:.4f} | 1 |")
     print(f"| the same by scikit-fem's form | {slow:.4f} | {slow / fast:.0f} |")
     constraints = constrain(space, (Support("bottom", "x"), Support("bottom", "y")))
@@ -87,7 +75,7 @@ def main() -> None:
             solver.factor(matrix)
             assert solver.solve(rhs).ok
 
-        taken = seconds(solve, 3)
+        taken = median_time(solve, 3)
         print(f"| factorisation and checked solve, {name} | {taken:.3f} | {taken / fast:.0f} |")
 
 

@@ -7,7 +7,7 @@ import umat
 from umat import mandel
 from umat.chang_hicher.material import contact_forces
 from umat.directions import directions, mirrored, rotated
-from umat.fabric import Constant
+from umat.fabric import Constant, LiDafalias, ZhaoKruyt
 from umat.lanes import COMPILED
 from umat.sands import SANDS, toyoura
 from umat.threads import get_threads
@@ -36,6 +36,15 @@ def test_old_state_and_increment_are_not_touched(regimes):
 def test_same_call_has_the_same_answer(regimes):
     once = regimes.updated()
     regimes.updated(-0.3 * regimes.increment)
+    assert same(regimes.updated(), once)
+
+
+@pytest.mark.parametrize("law", [ZhaoKruyt(), Constant(), LiDafalias()])
+def test_what_was_computed_before_does_not_matter(law, regimes):
+    once = regimes.updated()
+    other = regimes.material._replace(law=law)
+    strain = np.random.default_rng(5).normal(scale=1e-3, size=regimes.increment.shape)
+    umat.update(other, regimes.directions, strain, regimes.state)
     assert same(regimes.updated(), once)
 
 

@@ -30,7 +30,8 @@ def test_regimes_are_what_they_are_called(regimes):
 def test_taylor_remainder_is_of_second_order(regimes):
     base, n = regimes.updated(), len(regimes.names)
     ratio = 2.0 ** -np.arange(5)
-    sizes = np.outer(regimes.largest * mandel.norm(regimes.increment), ratio)
+    # well above the residual, 1e-5 of the increment at most, at which the tangent is taken
+    sizes = np.outer(np.maximum(regimes.largest, 2e-3) * mandel.norm(regimes.increment), ratio)
     trial = regimes.increment[:, None] + sizes[..., None] * DIRECTION
     response = umat.update(regimes.material, regimes.directions, trial.reshape(-1, 6), regimes.repeated(len(ratio)))
     assert not response.status.any()

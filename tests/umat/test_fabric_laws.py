@@ -44,14 +44,14 @@ EXTENSION = -COMPRESSION
 def evaluate(law: Any, inputs: np.ndarray) -> np.ndarray:
     """Return ΔF (6, LANES) of inputs (31, LANES)."""
     out = np.zeros((6, LANES))
-    increments(law, np.ascontiguousarray(inputs).reshape(-1), out.reshape(-1), LANES)
+    increments(law, np.ascontiguousarray(inputs).reshape(-1), out.reshape(-1))
     return out
 
 
 def slope(law: Any, inputs: np.ndarray, how: Callable[..., None] = slope_of) -> np.ndarray:
     """Return dΔF/d inputs (6, 31, LANES)."""
     out = np.zeros((6 * INPUTS, LANES))
-    how(law, np.ascontiguousarray(inputs).reshape(-1), out.reshape(-1), LANES)
+    how(law, np.ascontiguousarray(inputs).reshape(-1), out.reshape(-1))
     return out.reshape(6, INPUTS, LANES)
 
 
@@ -60,8 +60,8 @@ def _slope_kernel() -> Callable[..., None]:
     from numba import njit
 
     @njit
-    def kernel(law, inputs, out, width):
-        slope_of(law, inputs, out, width)
+    def kernel(law, inputs, out):
+        slope_of(law, inputs, out)
 
     return kernel
 

@@ -36,9 +36,9 @@ __all__ = ["ChangHicher", "ChangHicherState"]
 _local = threading.local()
 
 
-def _pool(n_directions: int, total: bool) -> Any:
-    """Return this thread's storage."""
-    key = (n_directions, total)
+def _pool(n_directions: int, symmetry: str, total: bool, law: type) -> Any:
+    """Return this thread's storage: what one set of equations does not write must stay as it was made."""
+    key = (n_directions, symmetry, total, law)
     if getattr(_local, "key", None) != key:
         _local.key, _local.pool = key, make_pool(n_directions, total)
     return _local.pool
@@ -63,7 +63,7 @@ def _(material: ChangHicher, directions: Directions, strain_increment: ArrayLike
     parts = max(min(get_threads(), n // LANES), 1)
 
     def kernel(begin: int, end: int) -> None:
-        pool = _pool(len(rule.weights), constants.total)
+        pool = _pool(len(rule.weights), directions.symmetry, constants.total, type(material.law))
         with np.errstate(all="ignore"):  # lanes outside the domain are computed too, and left alone
             for part in range(begin, end):
                 mine = np.ascontiguousarray(order[part::parts])

@@ -5,45 +5,37 @@ the material is stable. A vanishing pivot gives a step that is not finite, or wi
 step control see to those.
 """
 
-from ..lanes import at, kernel, lanes
+from ..lanes import inlined, kernel, put, row
 
 
 @kernel
-def factorise(rows, matrix, n, width):
+def factorise(rows, matrix, n):
     """Replace n × n rows by their L U factors, the diagonal by its inverse."""
     for k in range(n):
-        diagonal = matrix + k * n + k
-        for l in lanes(width):
-            rows[at(diagonal, l)] = 1.0 / rows[at(diagonal, l)]
+        inverse = 1.0 / row(rows, matrix + k * n + k)
+        put(rows, matrix + k * n + k, inverse)
         for i in range(k + 1, n):
-            factor = matrix + i * n + k
-            for l in lanes(width):
-                rows[at(factor, l)] *= rows[at(diagonal, l)]
-            for j in range(k + 1, n):
-                target, above = matrix + i * n + j, matrix + k * n + j
-                for l in lanes(width):
-                    rows[at(target, l)] -= rows[at(factor, l)] * rows[at(above, l)]
+            factor = row(rows, matrix + i * n + k) * inverse
+            put(rows, matrix + i * n + k, factor)
+            subtract(rows, factor, matrix + i * n + k + 1, matrix + k * n + k + 1, n - k - 1)
 
 
 @kernel
-def solve(rows, matrix, right, n, m, width):
+def solve(rows, matrix, right, n, m):
     """Replace n × m rows by the solutions of the factorised systems."""
     for k in range(n):
         for i in range(k + 1, n):
-            subtract(rows, matrix + i * n + k, right + i * m, right + k * m, m, width)
+            subtract(rows, row(rows, matrix + i * n + k), right + i * m, right + k * m, m)
     for k in range(n - 1, -1, -1):
-        diagonal = matrix + k * n + k
+        inverse = row(rows, matrix + k * n + k)
         for j in range(m):
-            target = right + k * m + j
-            for l in lanes(width):
-                rows[at(target, l)] *= rows[at(diagonal, l)]
+            put(rows, right + k * m + j, row(rows, right + k * m + j) * inverse)
         for i in range(k):
-            subtract(rows, matrix + i * n + k, right + i * m, right + k * m, m, width)
+            subtract(rows, row(rows, matrix + i * n + k), right + i * m, right + k * m, m)
 
 
-@kernel
-def subtract(rows, factor, target, source, m, width):
-    """Subtract factor times m rows from m rows."""
+@inlined
+def subtract(rows, factor, target, source, m):
+    """Subtract a factor times m rows from m rows."""
     for j in range(m):
-        for l in lanes(width):
-            rows[at(target + j, l)] -= rows[at(factor, l)] * rows[at(source + j, l)]
+        put(rows, target + j, row(rows, target + j) - factor * row(rows, source + j))

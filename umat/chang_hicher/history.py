@@ -9,13 +9,15 @@ points that needed more than one sub-step pass here.
 
 import numpy as np
 
-from ..lanes import kernel, spot
-from .balance import HALF_SQRT2, contact_density, critical_void_ratio, inverse_fabric
+from ..fabric.law import scaled
+from ..lanes import inlined, kernel, spot
+from .balance import HALF_SQRT2, contact_density, critical_void_ratio, inverse_fabric, matrix, plain, times
 from .contact import TINY
 from .rows import (
     BY_FABRIC,
     BY_VOID,
     DILATANCY,
+    FABRIC,
     FABRIC_MIDDLE,
     FORCE,
     FORCE_OLD,
@@ -35,7 +37,7 @@ from .rows import (
 )  # fmt: skip
 
 
-@kernel
+@inlined
 def clear(a):
     """Set a matrix to zero."""
     for i in range(a.shape[0]):
@@ -43,7 +45,7 @@ def clear(a):
             a[i, j] = 0.0
 
 
-@kernel
+@inlined
 def assign(a, b):
     """Copy a matrix."""
     for i in range(a.shape[0]):
@@ -162,7 +164,7 @@ def plane_change(rows, done, elastic, n, l, small):
 @kernel
 def carried(rows, slide, base, rule, constants, change, dz, dslide, out, small, long, l):
     """Fill dε and dε^p (12, 6) through the start of the sub-step: `change` (13, 6), dz (9, 6), dslide (N, 6)."""
-    normals, weights, _ = rule
+    normals, weights = rule.normals, rule.weights
     elastic, line, tan_mu = constants.elastic, constants.line, constants.tan_mu
     total, evolving = constants.total, constants.evolving
     sums, dz_new, dilate = long[:18], long[18:27], long[27]
@@ -204,33 +206,35 @@ def carried(rows, slide, base, rule, constants, change, dz, dslide, out, small, 
                 out[i, c] += rows[spot(place, l)] * change[6 + k, c]
 
 
-@kernel
+@inlined
+def six_of(rows, first, l):
+    """Return six numbers of lane l."""
+    return (
+        rows[spot(first, l)],
+        rows[spot(first + 1, l)],
+        rows[spot(first + 2, l)],
+        rows[spot(first + 3, l)],
+        rows[spot(first + 4, l)],
+        rows[spot(first + 5, l)],
+    )
+
+
+@inlined
 def start_force(rows, total, l):
     """Fill Z at the start of an increment: σ G⁻¹ / c(e), or nothing where forces are kept direction by direction."""
     for i in range(9):
         rows[spot(FORCE_OLD + i, l)] = 0.0
     if not total:
         return
-    h = HALF_SQRT2
-    a, b, c = rows[spot(OLD, l)], rows[spot(OLD + 1, l)], rows[spot(OLD + 2, l)]
-    d, e, f = h * rows[spot(OLD + 3, l)], h * rows[spot(OLD + 4, l)], h * rows[spot(OLD + 5, l)]
-    ga, gb, gc, gd, ge, gf = inverse_fabric(
-        rows[spot(OLD + 6, l)],
-        rows[spot(OLD + 7, l)],
-        rows[spot(OLD + 8, l)],
-        h * rows[spot(OLD + 9, l)],
-        h * rows[spot(OLD + 10, l)],
-        h * rows[spot(OLD + 11, l)],
-    )
-    scale = 1.0 / contact_density(rows[spot(OLD + 12, l)])[0]
-    entries = (a * ga + f * gf + e * ge, a * gf + f * gb + e * gd, a * ge + f * gd + e * gc,
-            f * ga + b * gf + d * ge, f * gf + b * gb + d * gd, f * ge + b * gd + d * gc,
-            e * ga + d * gf + c * ge, e * gf + d * gb + c * gd, e * ge + d * gd + c * gc)  # fmt: skip
+    stress, fabric = six_of(rows, OLD, l), six_of(rows, OLD + FABRIC, l)
+    inverse = inverse_fabric(plain(fabric))
+    scale = 1.0 / contact_density(rows[spot(OLD + VOID, l)])[0]
+    entries = times(matrix(plain(stress)), matrix(scaled(scale, inverse)))
     for i in range(9):
-        rows[spot(FORCE_OLD + i, l)] = entries[i] * scale
+        rows[spot(FORCE_OLD + i, l)] = entries[i]
 
 
-@kernel
+@inlined
 def density(rows, n, l):
     """Return 1 + F_m : n n."""
     cross = (
@@ -299,7 +303,7 @@ def law_carried(rows, change, strain_change, out, ratio, l):
 @kernel
 def advance(rows, slide, base, rule, constants, change, new, dz, dslide, small, l):
     """Move dZ and dλ to the end of the sub-step, whose state depends on the increment through `new` (13, 6)."""
-    normals, weights, _ = rule
+    normals, weights = rule.normals, rule.weights
     elastic, line, total = constants.elastic, constants.line, constants.total
     if total:
         clear(dz)

@@ -9,7 +9,7 @@ fifth of its room. There is no other line search.
 
 import numpy as np
 
-from ..lanes import kernel, spot
+from ..lanes import inlined, kernel, spot
 from .pool import CUT, EQUILIBRIUM, EVALUATIONS, ITERATE, ITERATIONS, TRIAL, TRIES
 from .rows import (
     ACCEPTED,
@@ -17,6 +17,7 @@ from .rows import (
     BY_VOID_STRAIN,
     FABRIC,
     FACTOR,
+    FINAL,
     FRACTION,
     FRESH,
     FULL,
@@ -35,7 +36,9 @@ from .rows import (
 )  # fmt: skip
 
 NEWTON_TOLERANCE = 1e-8  #: of the residual strain before the last correction, relative to the sub-step
+SMALL, QUADRATIC = 1e-5, 3e-4  #: the same if it fell by this factor in the last step: see `converged`
 NEWTON_FLOOR = 2e-15  #: of the residual strain, absolute: the rounding of the sums
+NEAR = 0.2  #: residual relative to the sub-step from which the next one is expected to be the last
 STALLED = 1e-6  #: residual relative to the sub-step that is taken when it falls no more
 MAX_ITERATIONS = 14
 MAX_TRIES = 10  #: at one Newton step
@@ -45,9 +48,8 @@ KEPT_ROOM = 0.2  #: of the room to the friction limit that a step out of the dom
 
 
 @kernel
-def begin(pool, l):
+def begin(rows, counts, l):
     """Set the trial state of a new sub-step: the old stress and fabric, the void ratio of its end."""
-    rows = pool.rows
     portion, fraction = rows[spot(PORTION, l)], rows[spot(FRACTION, l)]
     volume = rows[spot(FULL, l)] + rows[spot(FULL + 1, l)] + rows[spot(FULL + 2, l)]
     for i in range(6):
@@ -57,17 +59,16 @@ def begin(pool, l):
     specific = (1.0 + rows[spot(VOID_START, l)]) * np.exp(-(fraction + portion) * volume)
     rows[spot(Y + VOID, l)] = specific - 1.0
     rows[spot(BY_VOID_STRAIN, l)] = -specific * (fraction + portion)
-    again(pool, l)
+    again(rows, counts, l)
 
 
-@kernel
-def again(pool, l):
+@inlined
+def again(rows, counts, l):
     """Begin to iterate from the trial state."""
-    rows = pool.rows
     rows[spot(FACTOR, l)], rows[spot(FRESH, l)], rows[spot(TAKEN, l)] = 1.0, 1.0, 1.0
-    rows[spot(BEST, l)] = np.inf
-    pool.counts[ITERATIONS, l] = 0
-    pool.counts[TRIES, l] = 0
+    rows[spot(BEST, l)], rows[spot(FINAL, l)] = np.inf, 0.0
+    counts[ITERATIONS, l] = 0
+    counts[TRIES, l] = 0
 
 
 @kernel
@@ -79,7 +80,7 @@ def toward_centre(rows, l, keep):
         rows[spot(Y + i, l)] = centre + keep * (rows[spot(OLD + i, l)] - centre)
 
 
-@kernel
+@inlined
 def place_trial(rows, l):
     """Set the trial state to a part of the last Newton step."""
     for i in range(12):
@@ -97,7 +98,7 @@ def reach(pool, count, l):
     for a in range(count):
         kept, tried = pool.guess[spot(6 * a, l)], pool.guess[spot(6 * a + 3, l)]
         if not tried > 0.0:
-            part = min(part, (1.0 - KEPT_ROOM) * kept / (kept - tried))
+            part = min(part, (1.0 - KEPT_ROOM) / (1.0 - tried * kept))
     return part if 0.0 < part < 1.0 else 0.5
 
 
@@ -105,12 +106,30 @@ def reach(pool, count, l):
 def shorten(pool, count, l):
     """Set the next trial of a Newton step that left the domain."""
     pool.rows[spot(FACTOR, l)] *= reach(pool, count, l)
-    pool.rows[spot(TAKEN, l)] = 0.0
+    pool.rows[spot(TAKEN, l)], pool.rows[spot(FINAL, l)] = 0.0, 0.0
     pool.counts[TRIES, l] += 1
     place_trial(pool.rows, l)
 
 
-@kernel
+@inlined
+def converged(norm, previous, length):
+    """Return whether the last correction and the tangent are good enough at a residual.
+
+    Where Newton converges quadratically the relative change of the Jacobian in the correction to come is about twice
+    (norm/previous)², and so is what the correction leaves of the residual.
+    """
+    falling = norm <= SMALL * length and norm <= QUADRATIC * previous
+    return falling or norm <= NEWTON_TOLERANCE * length + NEWTON_FLOOR
+
+
+@inlined
+def once_more(rows, l):
+    """Ask for a full evaluation of the same state; estimates of the sliding stay what they were."""
+    rows[spot(FINAL, l)], rows[spot(TAKEN, l)] = 1.0, 0.0
+    return TRIAL
+
+
+@inlined
 def judge(constants, count, pool, l):
     """Return what a lane does with the state just evaluated; count: contact directions."""
     rows, counts = pool.rows, pool.counts
@@ -127,12 +146,14 @@ def judge(constants, count, pool, l):
             shorten(pool, count, l)
         out_of_means = counts[TRIES, l] > MAX_TRIES or counts[EVALUATIONS, l] >= constants.max_evaluations
         return CUT if out_of_means else TRIAL
+    stalled = norm <= STALLED * length + 10.0 * NEWTON_FLOOR and norm > 0.5 * best
+    if converged(norm, best, length) or stalled:
+        if rows[spot(FINAL, l)] == 0.0:
+            return once_more(rows, l)
+        return EQUILIBRIUM
     rows[spot(BEST, l)] = norm
     counts[TRIES, l] = 0
     counts[ITERATIONS, l] += 1
-    stalled = norm <= STALLED * length + 10.0 * NEWTON_FLOOR and norm > 0.5 * best
-    if norm <= NEWTON_TOLERANCE * length + NEWTON_FLOOR or stalled:
-        return EQUILIBRIUM
     if counts[ITERATIONS, l] > MAX_ITERATIONS or counts[EVALUATIONS, l] >= constants.max_evaluations:
         return CUT
     for i in range(12):
@@ -140,7 +161,7 @@ def judge(constants, count, pool, l):
     return ITERATE
 
 
-@kernel
+@inlined
 def take_step(pool, components, evolving, l):
     """Set the trial state to the Newton step just solved; False if it is not finite."""
     rows, nc = pool.rows, components.shape[0]
@@ -154,11 +175,12 @@ def take_step(pool, components, evolving, l):
             rows[spot(STEP + FABRIC + components[row], l)] = step
             total += step
     rows[spot(FACTOR, l)], rows[spot(TAKEN, l)], rows[spot(FRESH, l)] = 1.0, 1.0, 0.0
+    rows[spot(FINAL, l)] = 1.0 if rows[spot(BEST, l)] <= NEAR * rows[spot(LENGTH, l)] else 0.0
     place_trial(rows, l)
     return np.isfinite(total)
 
 
-@kernel
+@inlined
 def correct(pool, components, evolving, l):
     """Add the last Newton step, which the residual of an equilibrium is still good for, to stress and fabric."""
     rows, nc = pool.rows, components.shape[0]

@@ -16,37 +16,39 @@ from numpy.typing import NDArray
 from ..directions import Directions
 from .contact import GROUP
 from .rows import (
+    AXES,
     BARE,
     BARE_SLIPPED,
     BY_DILATANCY,
     BY_FRICTION,
+    BY_NORMAL,
+    BY_TANGENT,
     D_DILATANCY,
     D_FRICTION,
     D_LATE,
     D_SLIPPED,
     DISPLACEMENT,
+    ELASTIC,
     H_SLIPPED,
     LATE,
+    PAIR,
     SLIPPED,
-    STIFFNESS,
     STIFFNESS_SLIPPED,
     T_SLIPPED,
+    TANGENTIAL,
+    TRIPLE,
     WASTE,
     D,
-    H,
     T,
 )  # fmt: skip
-
-AXES = range(3)
-PAIR = [(0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1)]
-TRIPLE = [(i, j, k) for i in AXES for j in AXES for k in AXES if i <= j <= k]
 
 
 class Terms(NamedTuple):
     """Terms (buffer row, three out rows, three moment columns), and the Mandel components that do not vanish."""
 
     always: NDArray[np.int64]
-    evolving: NDArray[np.int64]
+    final: NDArray[np.int64]  #: for the error, in the last evaluation
+    density: NDArray[np.int64]  #: for the derivative by an evolving fabric, in the last evaluation
     components: NDArray[np.int64]
 
 
@@ -55,7 +57,8 @@ class Rule(NamedTuple):
 
     normals: NDArray[np.float64]
     weights: NDArray[np.float64]
-    table: NDArray[np.float64]
+    table: NDArray[np.float64]  #: zero where there is no weight
+    used: int  #: without the padding
 
 
 @lru_cache(maxsize=2)
@@ -65,18 +68,21 @@ def terms(mirrored: bool) -> Terms:
     def kept(*index: int) -> bool:
         return not mirrored or index.count(2) % 2 == 0
 
-    first = ((D, DISPLACEMENT), (D_SLIPPED, SLIPPED), (D_LATE, LATE), (D_FRICTION, BY_FRICTION))
-    always = [(out + 3 * i + j, row + i, j) for out, row in first for i, j in product(AXES, AXES) if kept(i, j)]
-    always += [(D_DILATANCY + s, BY_DILATANCY, 3 + s) for s, pair in enumerate(PAIR) if kept(*pair)]
-    stiffness = [(6 * (3 * i + k) + s, 3 * i + k, 3 + s)
-                 for i, k in product(AXES, AXES) for s, pair in enumerate(PAIR) if kept(i, k, *pair)]  # fmt: skip
-    density = [(10 * i + s, i, 9 + s) for i in AXES for s, triple in enumerate(TRIPLE) if kept(i, *triple)]
-    always += [(H + o, STIFFNESS + b, c) for o, b, c in stiffness]
-    evolving = [(H_SLIPPED + o, STIFFNESS_SLIPPED + b, c) for o, b, c in stiffness]
-    evolving += [(T + o, BARE + b, c) for o, b, c in density]
-    evolving += [(T_SLIPPED + o, BARE_SLIPPED + b, c) for o, b, c in density]
+    def pairs(out: Any, row: Any) -> list[tuple[Any, Any, Any]]:
+        return [(out + 3 * i + j, row + i, j) for i, j in product(AXES, AXES) if kept(i, j)]
+
+    def triples(out: Any, row: Any) -> list[tuple[Any, Any, Any]]:
+        return [(out + 10 * i + s, row + i, 9 + s) for i in AXES for s, triple in enumerate(TRIPLE) if kept(i, *triple)]
+
+    always = pairs(D, DISPLACEMENT) + pairs(D_SLIPPED, SLIPPED) + pairs(D_FRICTION, BY_FRICTION)
+    for out, row in ((D_DILATANCY, BY_DILATANCY), (TANGENTIAL, BY_TANGENT)):
+        always += [(out + s, row, 3 + s) for s, pair in enumerate(PAIR) if kept(*pair)]
+    always += [(H_SLIPPED + 6 * (3 * i + k) + s, STIFFNESS_SLIPPED + 3 * i + k, 3 + s)
+               for i, k in product(AXES, AXES) for s, pair in enumerate(PAIR) if kept(i, k, *pair)]  # fmt: skip
+    always += triples(ELASTIC, BY_NORMAL)
+    density = triples(T, BARE) + triples(T_SLIPPED, BARE_SLIPPED)
     components = np.array([0, 1, 2, 5] if mirrored else range(6))
-    return Terms(_in_threes(always), _in_threes(evolving), components)
+    return Terms(_in_threes(always), _in_threes(pairs(D_LATE, LATE)), _in_threes(density), components)
 
 
 def _in_threes(terms: list[tuple[Any, Any, Any]]) -> NDArray[np.int64]:
@@ -105,4 +111,5 @@ def padded(directions: Directions) -> Rule:
     missing = -len(directions.weights) % GROUP
     normals = np.vstack([directions.normals, np.repeat(directions.normals[:1], missing, axis=0)])
     weights = np.concatenate([directions.weights, np.zeros(missing)])
-    return Rule(np.ascontiguousarray(normals), weights, moments(normals))
+    table = moments(normals) * (weights > 0.0)[:, None]
+    return Rule(np.ascontiguousarray(normals), weights, table, len(directions.weights))

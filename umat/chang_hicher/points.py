@@ -3,7 +3,7 @@
 import numpy as np
 
 from .. import status
-from ..lanes import kernel, spot
+from ..lanes import inlined, kernel, spot
 from .balance import FLOOR, MAX_VOID_RATIO, contact_density
 from .history import start_force
 from .iteration import begin
@@ -29,7 +29,7 @@ from .rows import (
 LOOSEST = 1.5  #: void ratio for the stabilising tangent of a point, at most
 
 
-@kernel
+@inlined
 def old_pressure(rows, l):
     """Return the mean pressure at the start of the sub-step."""
     return (rows[spot(OLD, l)] + rows[spot(OLD + 1, l)] + rows[spot(OLD + 2, l)]) / 3.0
@@ -53,7 +53,7 @@ def mean_force(constants, rule, pool, l):
     return total * contact_density(rows[spot(OLD + VOID, l)])[0] / 3.0
 
 
-@kernel
+@inlined
 def load_contacts(constants, rule, pool, slip, force, point, l):
     """Put sliding and forces of a point into a lane, weightless directions like the first; return their sum."""
     total, count = 0.0, slip.shape[1]
@@ -68,7 +68,7 @@ def load_contacts(constants, rule, pool, slip, force, point, l):
     return total
 
 
-@kernel
+@inlined
 def load(constants, rule, pool, data, out, point, l):
     """Put a point into a lane and return True, or settle it at once: refused, or open all the time."""
     stress, fabric, void_ratio, slip, force, gap, strain = data
@@ -101,11 +101,11 @@ def load(constants, rule, pool, data, out, point, l):
         out[2][point], out[5][point] = end, gap[point] - volume
         elastic_open(constants, rows, out[6], point, l)
         return report(pool, out, status.OK, l)
-    begin(pool, l)
+    begin(pool.rows, pool.counts, l)
     return True
 
 
-@kernel
+@inlined
 def report(pool, out, code, l):
     """Write a point's status and the work spent on it; return False."""
     point = pool.counts[POINT, l]
@@ -152,7 +152,7 @@ def open_point(constants, rule, pool, out, before, l):
     report(pool, out, status.OK, l)
 
 
-@kernel
+@inlined
 def finish(constants, rule, pool, strain, out, l):
     """Write a point's answer."""
     stress, fabric, void_ratio, slip, force, gap, tangent = out[:7]

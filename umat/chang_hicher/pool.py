@@ -38,6 +38,7 @@ class Pool(NamedTuple):
     rows: Array  #: see `rows`
     slide: Array  #: sliding done, N rows, and at the end of the sub-step, N rows
     guess: Array  #: what the estimates of the sliding need, 6 N rows: of the accepted iterate 3, of the trial 3
+    start: Array  #: normal force, its root and tangential force at the start of the sub-step, 5 N rows
     base: Array  #: forces at the start of the increment, 3 N rows, in the rate form
     buffer: Array  #: contributions of `GROUP` directions
     change: Array  #: (LANES, 13, 6) derivative of (σ, F, e) at the start of the sub-step by the increment
@@ -55,7 +56,7 @@ def make_pool(n_directions: int, total: bool) -> Pool:
     """Return storage for `n_directions` padded directions, every lane at a harmless state."""
     n = n_directions
     pool = Pool(
-        rows=rows(int(ROWS)), slide=rows(2 * n), guess=rows(6 * n), base=rows(3 if total else 3 * n),
+        rows=rows(int(ROWS)), slide=rows(2 * n), guess=rows(6 * n), start=rows(5 * n), base=rows(3 if total else 3 * n),
         buffer=rows(int(GROUP * BUFFER)),
         change=np.zeros((LANES, 13, 6)), dz=np.zeros((LANES, 9, 6)), dslide=np.zeros((LANES, n, 6)),
         carried=np.zeros((12, 6)), carried_fabric=np.zeros((6, 6)), new_change=np.zeros((13, 6)),
@@ -65,6 +66,7 @@ def make_pool(n_directions: int, total: bool) -> Pool:
     by_row = pool.rows.reshape(ROWS, LANES)
     by_row[SHARE] = by_row[FACTOR] = by_row[FRESH] = 1.0
     pool.guess[:] = 1.0
+    pool.start[:] = 1.0
     for state in (Y, OLD):
         by_row[state : state + 3] = 1.0
         by_row[state + VOID] = 0.8

@@ -6,8 +6,8 @@ law's ΔF reads F, σ and ψ at the middle of the step and the step's increments
 
 import numpy as np
 
-from ..fabric.law import active_inputs, increments, six, slope_of
-from ..lanes import LANES, at, kernel, lanes
+from ..fabric.law import active_inputs, dot, increments, scaled, slope_of
+from ..lanes import LANES, inlined, kernel, put, row, six, store
 from .rows import (
     BY_VOID_STRAIN,
     COLUMNS,
@@ -48,172 +48,152 @@ FABRIC_WEIGHT = 0.1  #: of the fabric residual beside the strain residual
 
 
 @kernel
-def law_inputs(rows, weight, width):
+def law_inputs(rows, weight):
     """Fill what a fabric law reads, at old + weight (new − old): weight ½ the middle, 1 the end of the step."""
     for i in range(6):
-        for l in lanes(width):
-            stress, fabric = rows[at(OLD + i, l)], rows[at(OLD + FABRIC + i, l)]
-            rows[at(INPUTS + i, l)] = fabric + weight * (rows[at(Y + FABRIC + i, l)] - fabric)
-            rows[at(INPUTS + 6 + i, l)] = stress + weight * (rows[at(Y + i, l)] - stress)
-            rows[at(INPUTS + 19 + i, l)] = rows[at(PART + i, l)]
-            rows[at(INPUTS + 25 + i, l)] = rows[at(PLASTIC + i, l)]
-    for l in lanes(width):
-        rows[at(INPUTS + 12, l)] = rows[at(PSI, l)]
-        i_p = 3.0 / np.maximum(rows[at(Y, l)] + rows[at(Y + 1, l)] + rows[at(Y + 2, l)], 1e-12)
-        i_old = 3.0 / np.maximum(rows[at(OLD, l)] + rows[at(OLD + 1, l)] + rows[at(OLD + 2, l)], 1e-12)
-        # the identity part of s/p is the same at both ends
-        for i in range(6):
-            rows[at(INPUTS + 13 + i, l)] = rows[at(Y + i, l)] * i_p - rows[at(OLD + i, l)] * i_old
-
-
-@kernel
-def by_ratio(rows, state, out, width):
-    """Fill 6 × 6 rows with the law's derivative through s/p at the stress of `state`."""
+        stress, fabric = row(rows, OLD + i), row(rows, OLD + FABRIC + i)
+        put(rows, INPUTS + i, fabric + weight * (row(rows, Y + FABRIC + i) - fabric))
+        put(rows, INPUTS + 6 + i, stress + weight * (row(rows, Y + i) - stress))
+        put(rows, INPUTS + 19 + i, row(rows, PART + i))
+        put(rows, INPUTS + 25 + i, row(rows, PLASTIC + i))
+    put(rows, INPUTS + 12, row(rows, PSI))
+    i_p = 3.0 / np.maximum(row(rows, Y) + row(rows, Y + 1) + row(rows, Y + 2), 1e-12)
+    i_old = 3.0 / np.maximum(row(rows, OLD) + row(rows, OLD + 1) + row(rows, OLD + 2), 1e-12)
     for i in range(6):
-        row = LAW_SLOPE + LAW_INPUTS * i + 13
-        for l in lanes(width):
-            d, y = six(rows, row, l), six(rows, state, l)
-            i_p = 3.0 / np.maximum(y[0] + y[1] + y[2], 1e-12)
-            # d(s/p) = dσ/p − σ tr dσ / (3 p²)
-            pull = (d[0] * y[0] + d[1] * y[1] + d[2] * y[2] + d[3] * y[3] + d[4] * y[4] + d[5] * y[5]) * i_p / 3.0
-            for k in range(6):
-                volumetric = pull if k < 3 else 0.0
-                rows[at(out + 6 * i + k, l)] = (rows[at(row + k, l)] - volumetric) * i_p
+        # the identity part of s/p is the same at both ends
+        put(rows, INPUTS + 13 + i, row(rows, Y + i) * i_p - row(rows, OLD + i) * i_old)
 
 
 @kernel
-def fabric_rows(law, rows, width):
+def by_ratio(rows, state, out):
+    """Fill 6 × 6 rows with the law's derivative through s/p at the stress of `state`."""
+    y = six(rows, state)
+    i_p = 3.0 / np.maximum(y[0] + y[1] + y[2], 1e-12)
+    for i in range(6):
+        d = six(rows, LAW_SLOPE + LAW_INPUTS * i + 13)
+        # d(s/p) = dσ/p − σ tr dσ / (3 p²)
+        pull = dot(d, y) * i_p / 3.0
+        straight = (d[0] - pull, d[1] - pull, d[2] - pull, d[3], d[4], d[5])
+        store(rows, out + 6 * i, scaled(i_p, straight))
+
+
+@kernel
+def fabric_rows(law, rows):
     """Fill the law's increment and the total derivative of F − F_o − ΔF by (σ, F, e), 6 × 13 rows."""
     inputs, slope = rows[INPUTS * LANES : (INPUTS + LAW_INPUTS) * LANES], rows[LAW_SLOPE * LANES :]
-    increments(law, inputs, rows[GAIN * LANES : (GAIN + 6) * LANES], width)
-    slope_of(law, inputs, slope, width)
+    increments(law, inputs, rows[GAIN * LANES : (GAIN + 6) * LANES])
+    slope_of(law, inputs, slope)
     ratio = 13 in active_inputs(law)
     if ratio:
-        by_ratio(rows, Y, RATIO_SLOPE, width)
+        by_ratio(rows, Y, RATIO_SLOPE)
     for i in range(6):
         own, out = LAW_SLOPE + LAW_INPUTS * i, FABRIC_SLOPE + COLUMNS * i
+        by_psi = row(rows, PSI_P) * row(rows, own + 12)
         for k in range(6):
             third, one = 1.0 / 3.0 if k < 3 else 0.0, 1.0 if i == k else 0.0
-            for l in lanes(width):
-                by_psi = third * rows[at(PSI_P, l)] * rows[at(own + 12, l)]
-                rows[at(out + k, l)] = -0.5 * (rows[at(own + 6 + k, l)] - by_psi)
-                rows[at(out + FABRIC + k, l)] = one - 0.5 * rows[at(own + k, l)]
+            put(rows, out + k, -0.5 * (row(rows, own + 6 + k) - third * by_psi))
+            put(rows, out + FABRIC + k, one - 0.5 * row(rows, own + k))
             if ratio:
-                for l in lanes(width):
-                    rows[at(out + k, l)] -= rows[at(RATIO_SLOPE + 6 * i + k, l)]
-        for l in lanes(width):
-            rows[at(out + VOID, l)] = -0.5 * rows[at(own + 12, l)]
-        for c in range(COLUMNS):
-            by_plastic(rows, out + c, own + 25, PLASTIC_SLOPE + c, width)
+                put(rows, out + k, row(rows, out + k) - row(rows, RATIO_SLOPE + 6 * i + k))
+        put(rows, out + VOID, -0.5 * row(rows, own + 12))
+        by_plastic(rows, out, own + 25)
 
 
-@kernel
-def by_plastic(rows, out, law, plastic, width):
-    """Subtract the product of a row of the law's derivative with a column of the plastic strain's."""
-    for l in lanes(width):
-        d = six(rows, law, l)
-        rows[at(out, l)] -= (
-            d[0] * rows[at(plastic, l)]
-            + d[1] * rows[at(plastic + COLUMNS, l)]
-            + d[2] * rows[at(plastic + 2 * COLUMNS, l)]
-            + d[3] * rows[at(plastic + 3 * COLUMNS, l)]
-            + d[4] * rows[at(plastic + 4 * COLUMNS, l)]
-            + d[5] * rows[at(plastic + 5 * COLUMNS, l)]
+@inlined
+def by_plastic(rows, out, law):
+    """Subtract the product of a row of the law's derivative with the plastic strain's."""
+    d = six(rows, law)
+    for c in range(COLUMNS):
+        plastic = PLASTIC_SLOPE + c
+        change = (
+            d[0] * row(rows, plastic)
+            + d[1] * row(rows, plastic + COLUMNS)
+            + d[2] * row(rows, plastic + 2 * COLUMNS)
+            + d[3] * row(rows, plastic + 3 * COLUMNS)
+            + d[4] * row(rows, plastic + 4 * COLUMNS)
+            + d[5] * row(rows, plastic + 5 * COLUMNS)
         )
+        put(rows, out + c, row(rows, out + c) - change)
 
 
-@kernel
-def copy(rows, target, source, width):
+@inlined
+def copy(rows, target, source):
     """Copy a row."""
-    for l in lanes(width):
-        rows[at(target, l)] = rows[at(source, l)]
+    put(rows, target, row(rows, source))
 
 
 @kernel
-def gather(rows, components, evolving, width):
+def gather(rows, components, evolving):
     """Fill the square system of the components that do not vanish, and minus its residual."""
     nc = components.shape[0]
     n = 2 * nc if evolving else nc
     for i in range(nc):
         a = components[i]
-        for l in lanes(width):
-            rows[at(NEWTON + i, l)] = rows[at(PART + a, l)] - rows[at(STRAIN + a, l)]
+        put(rows, NEWTON + i, row(rows, PART + a) - row(rows, STRAIN + a))
         for j in range(nc):
             b = components[j]
-            copy(rows, MATRIX + i * n + j, SLOPE + COLUMNS * a + b, width)
+            copy(rows, MATRIX + i * n + j, SLOPE + COLUMNS * a + b)
             if evolving:
-                copy(rows, MATRIX + i * n + nc + j, SLOPE + COLUMNS * a + FABRIC + b, width)
-                copy(rows, MATRIX + (nc + i) * n + j, FABRIC_SLOPE + COLUMNS * a + b, width)
-                copy(rows, MATRIX + (nc + i) * n + nc + j, FABRIC_SLOPE + COLUMNS * a + FABRIC + b, width)
+                copy(rows, MATRIX + i * n + nc + j, SLOPE + COLUMNS * a + FABRIC + b)
+                copy(rows, MATRIX + (nc + i) * n + j, FABRIC_SLOPE + COLUMNS * a + b)
+                copy(rows, MATRIX + (nc + i) * n + nc + j, FABRIC_SLOPE + COLUMNS * a + FABRIC + b)
         if evolving:
-            for l in lanes(width):
-                rows[at(NEWTON + nc + i, l)] = (
-                    rows[at(GAIN + a, l)] - rows[at(Y + FABRIC + a, l)] + rows[at(OLD + FABRIC + a, l)]
-                )
+            gain = row(rows, Y + FABRIC + a) - row(rows, OLD + FABRIC + a)
+            put(rows, NEWTON + nc + i, row(rows, GAIN + a) - gain)
 
 
 @kernel
-def norms(rows, components, evolving, width):
+def norms(rows, components, evolving):
     """Fill the norm of the residual as a strain, and of the sub-step's strain."""
     nc = components.shape[0]
-    for l in lanes(width):
-        rows[at(NORM, l)], rows[at(LENGTH, l)] = 0.0, 0.0
+    part = six(rows, PART)
+    total = 0.0 * part[0]
     for i in range(nc):
-        for l in lanes(width):
-            rows[at(NORM, l)] += rows[at(NEWTON + i, l)] ** 2
+        total = total + row(rows, NEWTON + i) * row(rows, NEWTON + i)
         if evolving:
-            for l in lanes(width):
-                rows[at(NORM, l)] += (FABRIC_WEIGHT * rows[at(NEWTON + nc + i, l)]) ** 2
-    for i in range(6):
-        for l in lanes(width):
-            rows[at(LENGTH, l)] += rows[at(PART + i, l)] ** 2
-    for l in lanes(width):
-        rows[at(NORM, l)] = np.sqrt(rows[at(NORM, l)])
-        rows[at(LENGTH, l)] = np.sqrt(rows[at(LENGTH, l)])
+            fabric = FABRIC_WEIGHT * row(rows, NEWTON + nc + i)
+            total = total + fabric * fabric
+    put(rows, NORM, np.sqrt(total))
+    put(rows, LENGTH, np.sqrt(dot(part, part)))
 
 
 @kernel
-def right_hand_sides(rows, components, evolving, width):
+def right_hand_sides(rows, components, evolving):
     """Fill the tangent's columns (as if nothing depended on the start) and the error's column."""
     nc = components.shape[0]
-    for row in range(nc):
-        i = components[row]
+    portion, by_volume = row(rows, PORTION), row(rows, BY_VOID_STRAIN)
+    for place in range(nc):
+        i = components[place]
         for col in range(nc):
             c = components[col]
             volume, own = 1.0 if c < 3 else 0.0, 1.0 if c == i else 0.0
-            out = TANGENT + 6 * row + c
-            for l in lanes(width):
-                void = volume * rows[at(BY_VOID_STRAIN, l)]
-                rows[at(out, l)] = own * rows[at(PORTION, l)] - void * rows[at(SLOPE + COLUMNS * i + VOID, l)]
+            void = volume * by_volume
+            put(rows, TANGENT + 6 * place + c, own * portion - void * row(rows, SLOPE + COLUMNS * i + VOID))
             if evolving:
-                out = TANGENT + 6 * (nc + row) + c
-                for l in lanes(width):
-                    void = volume * rows[at(BY_VOID_STRAIN, l)]
-                    given = rows[at(PORTION, l)] * rows[at(LAW_SLOPE + LAW_INPUTS * i + 19 + c, l)]
-                    rows[at(out, l)] = given - void * rows[at(FABRIC_SLOPE + COLUMNS * i + VOID, l)]
-        for l in lanes(width):
-            # what a relaxed sub-step left undone is an error too
-            undone = rows[at(PLASTIC + i, l)] * (1.0 / rows[at(SHARE, l)] - 1.0)
-            rows[at(ERRORS + row, l)] = rows[at(FIRST + i, l)] + undone
+                given = portion * row(rows, LAW_SLOPE + LAW_INPUTS * i + 19 + c)
+                by_void = void * row(rows, FABRIC_SLOPE + COLUMNS * i + VOID)
+                put(rows, TANGENT + 6 * (nc + place) + c, given - by_void)
+        # what a relaxed sub-step left undone is an error too
+        error = row(rows, FIRST + i) + row(rows, PLASTIC + i) * (1.0 / row(rows, SHARE) - 1.0)
         if evolving:
             for k in range(6):
-                for l in lanes(width):
-                    gain = rows[at(Y + FABRIC + k, l)] - rows[at(OLD + FABRIC + k, l)]
-                    rows[at(ERRORS + row, l)] += rows[at(GEO + 6 * i + k, l)] * gain
-            for l in lanes(width):
-                rows[at(ERRORS + nc + row, l)] = rows[at(GAIN + i, l)] - rows[at(GAIN_END + i, l)]
+                gain = row(rows, Y + FABRIC + k) - row(rows, OLD + FABRIC + k)
+                error = error + row(rows, GEO + 6 * i + k) * gain
+            put(rows, ERRORS + nc + place, row(rows, GAIN + i) - row(rows, GAIN_END + i))
+        put(rows, ERRORS + place, error)
 
 
 @kernel
-def error_norms(rows, components, evolving, width):
+def error_norms(rows, components, evolving):
     """Fill the norms of the stress, of its error and of the fabric's error (squared)."""
     nc = components.shape[0]
-    for l in lanes(width):
-        rows[at(STRESS_NORM, l)], rows[at(STRESS_ERROR, l)], rows[at(FABRIC_ERROR, l)] = 0.0, 0.0, 0.0
-    for row in range(nc):
-        for l in lanes(width):
-            rows[at(STRESS_NORM, l)] += rows[at(Y + components[row], l)] ** 2
-            rows[at(STRESS_ERROR, l)] += rows[at(ERRORS + row, l)] ** 2
+    zero = 0.0 * row(rows, ERRORS)
+    length, stress, fabric = zero, zero, zero
+    for place in range(nc):
+        own, error = row(rows, Y + components[place]), row(rows, ERRORS + place)
+        length, stress = length + own * own, stress + error * error
         if evolving:
-            for l in lanes(width):
-                rows[at(FABRIC_ERROR, l)] += rows[at(ERRORS + nc + row, l)] ** 2
+            fabric = fabric + row(rows, ERRORS + nc + place) * row(rows, ERRORS + nc + place)
+    put(rows, STRESS_NORM, length)
+    put(rows, STRESS_ERROR, stress)
+    put(rows, FABRIC_ERROR, fabric)

@@ -21,7 +21,7 @@ _COUNTS = {
     "FRESH": 1,  # whether the sub-step has just begun
     "FACTOR": 1,  # part of the Newton step in the trial
     "RAISING": 1,  # whether the share is being raised to 1 in this sub-step; 2 where that failed
-    "BASE": 3,  # the force of the plane that does not come from Z
+    "FINAL": 1,  # whether the next equilibrium is near, so that everything is evaluated
     # states and unknowns
     "Y": 13,  # trial end of the step: stress, fabric, void ratio
     "OLD": 13,  # its start
@@ -41,7 +41,8 @@ _COUNTS = {
     "PSI": 1,
     "PSI_P": 1,  # state parameter at the middle, and de_c/dp there
     # averages over planes
-    "SUMS": 210,  # see `contact`
+    "SUMS": 192,  # see `contact`
+    "H": 54,  # H of all the displacement
     "WASTE": 3,  # what fills up a group of three sums
     "C": 81,  # H transformed by G_m⁻¹ and SCALED
     "PROJECTED": 9,  # D G_m⁻¹
@@ -87,7 +88,7 @@ _STARTS = {name: np.int64(row) for name, row in zip(_COUNTS, accumulate([0, *_CO
 ROWS = sum(_COUNTS.values())
 
 FORCE, FORCE_OLD, FRICTION, DILATANCY = (_STARTS[k] for k in ("FORCE", "FORCE_OLD", "FRICTION", "DILATANCY"))
-FABRIC_MIDDLE, MARGIN, SHARE, BASE = (_STARTS[k] for k in ("FABRIC_MIDDLE", "MARGIN", "SHARE", "BASE"))
+FABRIC_MIDDLE, MARGIN, SHARE, FINAL = (_STARTS[k] for k in ("FABRIC_MIDDLE", "MARGIN", "SHARE", "FINAL"))
 TAKEN, FRESH, RAISING = _STARTS["TAKEN"], _STARTS["FRESH"], _STARTS["RAISING"]
 Y, OLD, ACCEPTED, STEP, FULL, PART = (_STARTS[k] for k in ("Y", "OLD", "ACCEPTED", "STEP", "FULL", "PART"))
 INVERSE, SCALED, BY_FABRIC, BY_VOID = (_STARTS[k] for k in ("INVERSE", "SCALED", "BY_FABRIC", "BY_VOID"))
@@ -116,8 +117,15 @@ LAW_INPUTS = np.int64(31)
 
 # the buffer of one direction (each quantity times its weight)
 DISPLACEMENT, SLIPPED, LATE, BY_FRICTION, BY_DILATANCY = (np.int64(k) for k in (0, 3, 6, 9, 12))
-STIFFNESS, STIFFNESS_SLIPPED, BARE, BARE_SLIPPED, BUFFER = (np.int64(k) for k in (13, 22, 31, 34, 37))
+STIFFNESS_SLIPPED, BARE, BARE_SLIPPED, BY_TANGENT, BY_NORMAL, BUFFER = (np.int64(k) for k in (13, 22, 25, 28, 29, 32))
 
 # the sums over directions, from SUMS on
 D, D_SLIPPED, D_LATE, D_FRICTION, D_DILATANCY = SUMS, SUMS + 9, SUMS + 18, SUMS + 27, SUMS + 36
-H, H_SLIPPED, T, T_SLIPPED = SUMS + 42, SUMS + 96, SUMS + 150, SUMS + 180
+H_SLIPPED, T, T_SLIPPED, TANGENTIAL, ELASTIC = SUMS + 42, SUMS + 96, SUMS + 126, SUMS + 156, SUMS + 162
+H = _STARTS["H"]
+
+# order of symmetric pairs and triples of axes; the triple of an axis and a pair
+AXES = range(3)
+PAIR = [(0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1)]
+TRIPLE = [(i, j, k) for i in AXES for j in AXES for k in AXES if i <= j <= k]
+TRIPLES = np.array([[[sorted(t) for t in TRIPLE].index(sorted((k, *pair))) for pair in PAIR] for k in AXES])

@@ -12,10 +12,10 @@ import numpy as np
 
 from .. import status
 from ..fabric.law import active_inputs
-from ..lanes import kernel, spot
+from ..lanes import inlined, kernel, spot
 from .balance import FLOOR, MAX_VOID_RATIO, critical_void_ratio
 from .history import advance, assign, carried, clear, density, law_carried
-from .iteration import again, begin, correct, take_step
+from .iteration import again, begin, take_step
 from .points import finish, mean_force, old_pressure, open_point, report
 from .pool import CODE, EQUILIBRIUM, EVALUATIONS, ITERATE, SUBSTEPS
 from .rows import (
@@ -64,14 +64,14 @@ def through_start(law, constants, rule, components, pool, l):
                 rows[spot(TANGENT + 6 * (nc + row) + c, l)] -= pool.carried_fabric[components[row], c]
 
 
-@kernel
+@inlined
 def local_error(rows, l):
     """Return the estimated error of the sub-step: of the stress relative to its norm, or of the fabric."""
     stress = np.sqrt(rows[spot(STRESS_NORM, l)]) + STRESS_FLOOR
     return max(np.sqrt(rows[spot(STRESS_ERROR, l)]) / stress, np.sqrt(rows[spot(FABRIC_ERROR, l)]))
 
 
-@kernel
+@inlined
 def collect(pool, components, evolving, l):
     """Fill the derivative (13, 6) of the sub-step's end by the strain increment from the solved columns."""
     nc = components.shape[0]
@@ -115,7 +115,7 @@ def next_substep(constants, rule, pool, error, l):
     aligned = np.floor(fraction / (2.0 * portion)) * 2.0 * portion == fraction
     if error < 0.2 * constants.tolerance and aligned and fraction + 2.0 * portion <= 1.0:
         rows[spot(PORTION, l)] = 2.0 * portion
-    begin(pool, l)
+    begin(pool.rows, pool.counts, l)
     for i in range(12):
         rows[spot(Y + i, l)] += rows[spot(PORTION, l)] / portion * rows[spot(STEP + i, l)]
 
@@ -138,26 +138,42 @@ def reason(constants, rule, pool, l):
 
 
 @kernel
-def cut(constants, rule, pool, out, factor, lost, l):
-    """Shorten or relax the sub-step; when that is over, open the point or refuse it, and return True.
+def lost(constants, rule, pool, out, l):
+    """Act on a sub-step without equilibrium; return True when the point is finished.
 
-    lost: no equilibrium was found. Short sub-steps without one are relaxed: see the module's docstring.
+    First the share of sliding is raised in steps; then the sub-step is cut, or relaxed where it is short: see the
+    module's docstring.
     """
     rows = pool.rows
-    if lost and rows[spot(RAISING, l)] == 0.0:
+    if rows[spot(RAISING, l)] == 0.0:
         rows[spot(RAISING, l)], rows[spot(SHARE, l)] = 1.0, FIRST_SHARE
         if pool.counts[EVALUATIONS, l] < constants.max_evaluations:
-            begin(pool, l)
+            begin(pool.rows, pool.counts, l)
             return False
+    share = 1.0 if rows[spot(RAISING, l)] == 1.0 else rows[spot(SHARE, l)]
+    if rows[spot(PORTION, l)] > RELAXABLE or 0.25 * share < constants.least_share:
+        return cut(constants, rule, pool, out, 0.25, l)
+    rows[spot(RAISING, l)], rows[spot(SHARE, l)] = 2.0, 0.25 * share
+    return go_on(constants, rule, pool, out, l)
+
+
+@kernel
+def cut(constants, rule, pool, out, factor, l):
+    """Shorten the sub-step; return True when that is over and the point finished."""
+    rows = pool.rows
     if rows[spot(RAISING, l)] == 1.0:
-        rows[spot(RAISING, l)], rows[spot(SHARE, l)] = 2.0, 1.0
-    if lost and rows[spot(PORTION, l)] <= RELAXABLE and 0.25 * rows[spot(SHARE, l)] >= constants.least_share:
-        rows[spot(SHARE, l)] *= 0.25
-    else:
-        rows[spot(PORTION, l)] *= factor
-        rows[spot(RAISING, l)] = 0.0
+        rows[spot(SHARE, l)] = 1.0
+    rows[spot(RAISING, l)] = 0.0
+    rows[spot(PORTION, l)] *= factor
+    return go_on(constants, rule, pool, out, l)
+
+
+@kernel
+def go_on(constants, rule, pool, out, l):
+    """Begin the sub-step again; out of means open the point or refuse it, and return True."""
+    rows = pool.rows
     if rows[spot(PORTION, l)] >= SMALLEST and pool.counts[EVALUATIONS, l] < constants.max_evaluations:
-        begin(pool, l)
+        begin(pool.rows, pool.counts, l)
         return False
     p = min(old_pressure(rows, l), mean_force(constants, rule, pool, l))
     if p < NEARLY_OPEN * constants.open_pressure:
@@ -176,25 +192,24 @@ def opening(constants, rule, pool, out, p, l):
     """
     rows = pool.rows
     if rows[spot(PORTION, l)] > CROSSING:
-        return cut(constants, rule, pool, out, 0.25, False, l)
+        return cut(constants, rule, pool, out, 0.25, l)
     start, least = np.sqrt(old_pressure(rows, l)), np.sqrt(constants.open_pressure)
     before = (start - least) / (start - np.sqrt(p)) if start > least else 0.0
     open_point(constants, rule, pool, out, before, l)
     return True
 
 
-@kernel
+@inlined
 def settle(constants, components, rule, pool, strain, out, l):
     """Act on a lane's solved system; return True when its point is finished, one way or the other."""
     rows = pool.rows
     if pool.counts[CODE, l] == ITERATE and take_step(pool, components, constants.evolving, l):
         return False
     if pool.counts[CODE, l] != EQUILIBRIUM:
-        return cut(constants, rule, pool, out, 0.25, True, l)
-    correct(pool, components, constants.evolving, l)
+        return lost(constants, rule, pool, out, l)
     if rows[spot(RAISING, l)] == 1.0 and rows[spot(SHARE, l)] < 1.0:
         rows[spot(SHARE, l)] *= RAISE
-        again(pool, l)
+        again(pool.rows, pool.counts, l)
         return False
     p = (rows[spot(Y, l)] + rows[spot(Y + 1, l)] + rows[spot(Y + 2, l)]) / 3.0
     if p < constants.open_pressure:
@@ -205,7 +220,7 @@ def settle(constants, components, rule, pool, strain, out, l):
         factor *= 0.5
     relaxed = rows[spot(SHARE, l)] < 1.0
     if not error <= constants.tolerance and rows[spot(PORTION, l)] * factor >= SMALLEST and not relaxed:
-        return cut(constants, rule, pool, out, factor, False, l)
+        return cut(constants, rule, pool, out, factor, l)
     rows[spot(ERROR, l)] += error
     pool.counts[SUBSTEPS, l] += 1
     collect(pool, components, constants.evolving, l)

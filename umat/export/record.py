@@ -1,8 +1,8 @@
-"""Nested tuples of arrays laid into one block of memory, and compiled code that finds them there.
+"""Nested tuples of arrays and numbers laid into one block of memory, and compiled code that finds them there.
 
 The machine code must not allocate: numba's run-time, which counts references, is not in the library. So every array
 that the kernels work on lies at a fixed place of a block that the library holds, and a tuple of arrays is made of the
-block's address alone.
+block's address alone. Numbers are constants of the code.
 """
 
 from collections.abc import Iterator
@@ -19,7 +19,7 @@ ALIGNMENT = 64
 
 
 def block(record: Any) -> bytearray:
-    """Return the contents of a nested tuple of arrays, each at its place."""
+    """Return the contents of the arrays of a nested tuple, each at its place."""
     contents = bytearray()
     for array in _arrays(record):
         contents += np.ascontiguousarray(array).tobytes()
@@ -46,7 +46,7 @@ def _arrays(record: Any) -> Iterator[Any]:
     if isinstance(record, tuple):
         for part in record:
             yield from _arrays(part)
-    else:
+    elif isinstance(record, np.ndarray):
         yield record
 
 
@@ -58,10 +58,12 @@ def _places(record: Any) -> Iterator[int]:
 
 
 def _made(context: Any, builder: Any, memory: Any, record: Any, kind: Any, places: Iterator[int]) -> Any:
-    """Return the value of a nested tuple of arrays whose data begin at places of the memory."""
+    """Return the value of a nested tuple whose arrays' data begin at places of the memory."""
     if isinstance(record, tuple):
         parts = [_made(context, builder, memory, *each, places) for each in zip(record, kind, strict=True)]
         return context.make_tuple(builder, kind, parts)
+    if not isinstance(record, np.ndarray):
+        return context.get_constant(kind, record)
     array = make_array(kind)(context, builder)
     data = builder.bitcast(
         cgutils.pointer_add(builder, memory, next(places)), context.get_data_type(kind.dtype).as_pointer()

@@ -21,7 +21,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba.extending import overload
 
-from ..lanes import COMPILED, at, entry, kernel, lanes
+from ..lanes import COMPILED, at, entry, inlined, kernel, lanes
 
 #: place of each argument among the inputs of a law, and their number
 SPAN = {
@@ -77,13 +77,13 @@ def active_inputs(law: Any) -> tuple[int, ...]:
     return _LAWS[type(law)].inputs
 
 
-def slope_of(law: Any, inputs: Any, slope: Any, width: int) -> None:
+def slope_of(law: Any, inputs: Any, slope: Any) -> None:
     """Fill the derivative of the increment, rows 31 i + k, from the inputs' rows (both flat)."""
     entry = _LAWS[type(law)]
     if entry.slope is None:
-        complex_slope(law, inputs, slope, width)
+        complex_slope(law, inputs, slope)
     else:
-        entry.slope(law, inputs, slope, width)
+        entry.slope(law, inputs, slope)
 
 
 if COMPILED:
@@ -98,16 +98,16 @@ if COMPILED:
         return lambda law: inputs
 
     @overload(slope_of)
-    def _slope_of(law, inputs, slope, width):
+    def _slope_of(law, inputs, slope):
         entry = _LAWS[law.instance_class]
         if entry.slope is None:
-            return lambda law, inputs, slope, width: complex_slope(law, inputs, slope, width)
+            return lambda law, inputs, slope: complex_slope(law, inputs, slope)
         return entry.slope.py_func
 
 
-@kernel
-def six(rows, first, l):
-    """Return six rows as a tuple."""
+@inlined
+def six_at(rows, first, l):
+    """Return six rows as a tuple, of lane l (of all lanes with the compiler switched off)."""
     return (
         rows[at(first, l)],
         rows[at(first + 1, l)],
@@ -134,35 +134,35 @@ def _shifted(values, first, k):
 
 
 @entry
-def increments(law, inputs, out, width):
+def increments(law, inputs, out):
     """Fill six rows with the law's increments from the rows of its inputs (both flat)."""
-    for l in lanes(width):
+    for l in lanes():
         a, b, c, d, e, f = fabric_increment(
             law,
-            six(inputs, 0, l),
-            six(inputs, 6, l),
+            six_at(inputs, 0, l),
+            six_at(inputs, 6, l),
             inputs[at(12, l)],
-            six(inputs, 13, l),
-            six(inputs, 19, l),
-            six(inputs, 25, l),
+            six_at(inputs, 13, l),
+            six_at(inputs, 19, l),
+            six_at(inputs, 25, l),
         )
         out[at(0, l)], out[at(1, l)], out[at(2, l)] = a, b, c
         out[at(3, l)], out[at(4, l)], out[at(5, l)] = d, e, f
 
 
 @entry
-def complex_slope(law, inputs, slope, width):
+def complex_slope(law, inputs, slope):
     """Fill the derivative of any law by complex steps."""
     for k in active_inputs(law):
-        for l in lanes(width):
+        for l in lanes():
             values = fabric_increment(
                 law,
-                _shifted(six(inputs, 0, l), 0, k),
-                _shifted(six(inputs, 6, l), 6, k),
+                _shifted(six_at(inputs, 0, l), 0, k),
+                _shifted(six_at(inputs, 6, l), 6, k),
                 inputs[at(12, l)] + STEP * 1j * (k == 12),
-                _shifted(six(inputs, 13, l), 13, k),
-                _shifted(six(inputs, 19, l), 19, k),
-                _shifted(six(inputs, 25, l), 25, k),
+                _shifted(six_at(inputs, 13, l), 13, k),
+                _shifted(six_at(inputs, 19, l), 19, k),
+                _shifted(six_at(inputs, 25, l), 25, k),
             )
             a, b, c, d, e, f = values
             slope[at(k, l)] = a.imag / STEP
@@ -176,38 +176,38 @@ def complex_slope(law, inputs, slope, width):
 # --- tensors as 6-tuples, also complex -------------------------------------------------------------------------
 
 
-@kernel
+@inlined
 def dot(a, b):
     """Return a : b."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3] + a[4] * b[4] + a[5] * b[5]
 
 
-@kernel
+@inlined
 def scaled(k, a):
     """Return k a."""
     return (k * a[0], k * a[1], k * a[2], k * a[3], k * a[4], k * a[5])
 
 
-@kernel
+@inlined
 def plus(a, b):
     """Return a + b."""
     return (a[0] + b[0], a[1] + b[1], a[2] + b[2], a[3] + b[3], a[4] + b[4], a[5] + b[5])
 
 
-@kernel
+@inlined
 def deviator(a):
     """Return a - tr(a)/3 I."""
     m = (a[0] + a[1] + a[2]) / 3.0
     return (a[0] - m, a[1] - m, a[2] - m, a[3], a[4], a[5])
 
 
-@kernel
+@inlined
 def length(a):
     """Return √(a : a)."""
     return np.sqrt(dot(a, a) + TINY)
 
 
-@kernel
+@inlined
 def determinant(a):
     """Return det a of a tensor in Mandel components."""
     return a[0] * a[1] * a[2] + 0.5 * (
@@ -215,14 +215,14 @@ def determinant(a):
     )
 
 
-@kernel
+@inlined
 def cos3theta(a):
     """Return cos 3θ of a deviator, θ = 0 in compression; it fades to 0 where a is shorter than `SMALL`."""
     n2 = dot(a, a) + SMALL * SMALL
     return 3.0 * 6.0**0.5 * determinant(a) / (n2 * np.sqrt(n2))
 
 
-@kernel
+@inlined
 def stress_ratio(stress):
     """Return the tensor s/p and q/p."""
     p = (stress[0] + stress[1] + stress[2]) / 3.0

@@ -8,10 +8,9 @@ The exponential multiplies F:n only; otherwise there would be no peak.
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
-from ..lanes import at, kernel, lanes
-from .law import SMALL, TINY, cos3theta, determinant, deviator, dot, law, scaled, six, stress_ratio
+from ..lanes import inlined, kernel, put, row, six, store
+from .law import SMALL, TINY, cos3theta, determinant, deviator, dot, law, plus, scaled, stress_ratio
 
 SQRT6 = 6.0**0.5
 SQRT2 = 2.0**0.5
@@ -28,57 +27,70 @@ class ZhaoKruyt(NamedTuple):
 
 
 @kernel
-def _slope(law, inputs, slope, width):
+def _slope(law, inputs, slope):
     """Derivative of `increment`, written out: ΔF = h (F_c − a X) u with u the plastic deviator, a = F:u/‖u‖."""
     extension = law.extension
-    for l in lanes(width):
-        fabric, stress, psi = six(inputs, 0, l), six(inputs, 6, l), inputs[at(12, l)]
-        u = deviator(six(inputs, 25, l))
-        g = np.sqrt(dot(u, u) + TINY)
-        n = scaled(1.0 / g, u)
-        along = dot(fabric, n)
-        # F_c(θ_F) and its gradient
-        f = deviator(fabric)
-        f2 = dot(f, f) + SMALL * SMALL
-        f3 = 1.0 / (f2 * np.sqrt(f2))
-        fabric_lode = 3.0 * SQRT6 * determinant(f) * f3
-        slant = -(1.0 - extension) / (2.0 * extension)
-        critical = law.critical_fabric * ((1.0 + extension) / (2.0 * extension) + slant * fabric_lode)
-        df = cofactor(f)
-        kf = law.critical_fabric * slant * 3.0 * SQRT6 * f3
-        kf2 = -law.critical_fabric * slant * 3.0 * fabric_lode / f2
-        # M(θ_σ) − η and its gradient by s/p
-        ratio, eta = stress_ratio(stress)
-        r2 = dot(ratio, ratio) + SMALL * SMALL
-        r3 = 1.0 / (r2 * np.sqrt(r2))
-        lode = 3.0 * SQRT6 * determinant(ratio) * r3
-        bottom = 1.0 / (1.0 + extension - (1.0 - extension) * lode)
-        limit = law.critical_ratio * 2.0 * extension * bottom
-        dm = limit * (1.0 - extension) * bottom
-        dr = cofactor(ratio)
-        x = np.exp(law.m * (limit - eta) + psi)
-        k1, k2 = dm * 3.0 * SQRT6 * r3, -3.0 * dm * lode / r2 - 1.5 / eta
-        i_p = 3.0 / (stress[0] + stress[1] + stress[2])
-        trend = scaled(i_p, (
-            k1 * dr[0] + k2 * ratio[0], k1 * dr[1] + k2 * ratio[1], k1 * dr[2] + k2 * ratio[2],
-            k1 * dr[3] + k2 * ratio[3], k1 * dr[4] + k2 * ratio[4], k1 * dr[5] + k2 * ratio[5],
-        ))  # fmt: skip
-        # d(s/p) = dev(dσ)/p − (s/p) tr dσ/(3p); every factor here is deviatoric but ratio
-        pull = dot(trend, ratio) / 3.0
-        b = law.h * (critical - along * x)
-        kx = -law.h * along * x
-        for i in range(6):
-            hu = law.h * u[i]
-            for k in range(6):
-                slope[at(31 * i + k, l)] = hu * (kf * df[k] + kf2 * f[k] - x * n[k])
-                volumetric = pull if k < 3 else 0.0
-                slope[at(31 * i + 6 + k, l)] = kx * u[i] * law.m * (trend[k] - volumetric)
-                own = (2.0 / 3.0 if i == k else -1.0 / 3.0) if i < 3 and k < 3 else (1.0 if i == k else 0.0)
-                slope[at(31 * i + 25 + k, l)] = b * own - law.h * x * n[i] * (f[k] - along * n[k])
-            slope[at(31 * i + 12, l)] = kx * u[i]
+    fabric, stress, psi = six(inputs, 0), six(inputs, 6), row(inputs, 12)
+    u = deviator(six(inputs, 25))
+    g = np.sqrt(dot(u, u) + TINY)
+    n = scaled(1.0 / g, u)
+    along = dot(fabric, n)
+    # F_c(θ_F) and its gradient
+    f = deviator(fabric)
+    f2 = dot(f, f) + SMALL * SMALL
+    f3 = 1.0 / (f2 * np.sqrt(f2))
+    fabric_lode = 3.0 * SQRT6 * determinant(f) * f3
+    slant = -(1.0 - extension) / (2.0 * extension)
+    critical = law.critical_fabric * ((1.0 + extension) / (2.0 * extension) + slant * fabric_lode)
+    df = cofactor(f)
+    kf = law.critical_fabric * slant * 3.0 * SQRT6 * f3
+    kf2 = -law.critical_fabric * slant * 3.0 * fabric_lode / f2
+    # M(θ_σ) − η and its gradient by s/p
+    ratio, eta = stress_ratio(stress)
+    r2 = dot(ratio, ratio) + SMALL * SMALL
+    r3 = 1.0 / (r2 * np.sqrt(r2))
+    lode = 3.0 * SQRT6 * determinant(ratio) * r3
+    bottom = 1.0 / (1.0 + extension - (1.0 - extension) * lode)
+    limit = law.critical_ratio * 2.0 * extension * bottom
+    dm = limit * (1.0 - extension) * bottom
+    dr = cofactor(ratio)
+    x = np.exp(law.m * (limit - eta) + psi)
+    k1, k2 = dm * 3.0 * SQRT6 * r3, -3.0 * dm * lode / r2 - 1.5 / eta
+    i_p = 3.0 / (stress[0] + stress[1] + stress[2])
+    trend = scaled(i_p, (
+        k1 * dr[0] + k2 * ratio[0], k1 * dr[1] + k2 * ratio[1], k1 * dr[2] + k2 * ratio[2],
+        k1 * dr[3] + k2 * ratio[3], k1 * dr[4] + k2 * ratio[4], k1 * dr[5] + k2 * ratio[5],
+    ))  # fmt: skip
+    # d(s/p) = dev(dσ)/p − (s/p) tr dσ/(3p); every factor here is deviatoric but ratio
+    pull = dot(trend, ratio) / 3.0
+    b = law.h * (critical - along * x)
+    kx = -law.h * along * x
+    by_fabric = plus(scaled(kf, df), plus(scaled(kf2, f), scaled(-x, n)))
+    trend = (trend[0] - pull, trend[1] - pull, trend[2] - pull, trend[3], trend[4], trend[5])
+    kb = scaled(-law.h * x, plus(f, scaled(-along, n)))
+    parts = (scaled(law.h, by_fabric), scaled(kx * law.m, trend), kx, kb, b)
+    _slope_row(slope, 0, u[0], n[0], parts)
+    _slope_row(slope, 1, u[1], n[1], parts)
+    _slope_row(slope, 2, u[2], n[2], parts)
+    _slope_row(slope, 3, u[3], n[3], parts)
+    _slope_row(slope, 4, u[4], n[4], parts)
+    _slope_row(slope, 5, u[5], n[5], parts)
 
 
-@njit
+@inlined
+def _slope_row(slope, i, u, n, parts):
+    """Write the derivative of one component of ΔF, that of the plastic deviator being u."""
+    by_fabric, by_stress, by_psi, along, straight = parts
+    store(slope, 31 * i, scaled(u, by_fabric))
+    store(slope, 31 * i + 6, scaled(u, by_stress))
+    put(slope, 31 * i + 12, u * by_psi)
+    store(slope, 31 * i + 25, scaled(n, along))
+    for k in range(6):
+        own = (2.0 / 3.0 if i == k else -1.0 / 3.0) if i < 3 and k < 3 else (1.0 if i == k else 0.0)
+        put(slope, 31 * i + 25 + k, row(slope, 31 * i + 25 + k) + own * straight)
+
+
+@inlined
 def cofactor(a):
     """Return the deviator of the gradient of det a, Mandel components, a a deviator."""
     return deviator((

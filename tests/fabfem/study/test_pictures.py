@@ -178,7 +178,7 @@ fabric = { norm = 0.0 }
 def test_states_of_all_runs_are_gathered(tmp_path):
     text = CASE.replace(CASE[CASE.index("[material") : CASE.index("[initial]")], LIQUEFYING + "\n")
     text = (
-        text.replace('"drained"', '"undrained"').replace("0.01", "0.02").replace("increments = 10", "increments = 40")
+        text.replace('"drained"', '"undrained"').replace("0.01", "0.018").replace("increments = 10", "increments = 36")
     )
     text = text.replace('"gamma"', '"eta", "psi", "gamma"').replace('rows = "all"', "")
     text = text[: text.index("[[sweep.parameter]]")] + (

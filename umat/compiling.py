@@ -1,0 +1,61 @@
+"""How kernels that only other kernels call are compiled: to the compiler's intermediate code and no further.
+
+By itself numba optimises every function and makes machine code of it, although only the entry runs, which has all of
+them within it. `InnerCompiler` leaves both to the entry. It steps into the pass that numba's guide to customised
+compilers shows, and into two methods of the library of code that this pass fills.
+"""
+
+from typing import Any
+
+from numba._dynfunc import make_function
+from numba.core.codegen import JITCodeLibrary
+from numba.core.compiler import CompilerBase, DefaultPassBuilder
+from numba.core.compiler_machinery import register_pass
+from numba.core.typed_passes import NativeLowering
+
+
+class InnerLibrary(JITCodeLibrary):
+    """Code that is linked into other code and never run by itself."""
+
+    def _optimize_functions(self, module: Any) -> None:
+        """Leave it to the entry."""
+
+    def _optimize_final_module(self) -> None:
+        """Leave it to the entry."""
+
+    def _finalize_final_module(self) -> None:
+        """Make no machine code."""
+        self._finalize_dynamic_globals()
+        self._finalized = True
+
+
+@register_pass(mutates_CFG=True, analysis_only=False)
+class InnerLowering(NativeLowering):
+    """The last pass, for a function that others will have within them."""
+
+    _name = "inner_lowering"
+
+    def run_pass(self, state: Any) -> bool:
+        """Lower one function."""
+        state.library = InnerLibrary(state.targetctx.codegen(), state.func_id.func_qualname)
+        state.library.enable_object_caching()
+        state.flags.no_compile = True
+        super().run_pass(state)
+        lowered = state["cr"]
+        # what numba makes of a function without wrapper: only its identity is used
+        name, about = state.func_id.func_name, "called by other kernels only"
+        inner = make_function(lowered.fndesc.lookup_module(), name, about, 0, lowered.env, (state.library,))
+        state.targetctx.insert_user_function(inner, lowered.fndesc, [state.library])
+        state["cr"] = lowered._replace(cfunc=inner)
+        return True
+
+
+class InnerCompiler(CompilerBase):
+    """The compiler with that last pass."""
+
+    def define_pipelines(self) -> list[Any]:
+        """Return the usual passes but one."""
+        passes = DefaultPassBuilder.define_nopython_pipeline(self.state)
+        passes.passes = [(InnerLowering, why) if step is NativeLowering else (step, why) for step, why in passes.passes]
+        passes.finalize()
+        return [passes]
