@@ -32,15 +32,16 @@ DIRECT: dict[str, Any] = {
     "pc_factor_mat_solver_type": "mumps",
     "mat_mumps_icntl_14": 60,  # room for pivoting, per cent
 }
+# Jacobi, since an aggregate of held nodes leaves blocks on the coarser levels that SOR finds singular
 MULTIGRID: dict[str, Any] = {
     "ksp_type": "fgmres",
     "ksp_gmres_restart": 100,
     "ksp_max_it": 300,
     "pc_type": "gamg",
     "pc_gamg_threshold": 0.01,
-    "mg_levels_ksp_type": "richardson",
-    "mg_levels_pc_type": "sor",
-    "mg_levels_ksp_max_it": 2,
+    "mg_levels_ksp_type": "chebyshev",
+    "mg_levels_ksp_max_it": 3,
+    "mg_levels_pc_type": "jacobi",
 }
 SPLIT: dict[str, Any] = {
     "ksp_type": "fgmres",
@@ -53,9 +54,9 @@ SPLIT: dict[str, Any] = {
     "fieldsplit_motion_ksp_type": "preonly",
     "fieldsplit_motion_pc_type": "gamg",
     "fieldsplit_motion_pc_gamg_threshold": 0.01,
-    "fieldsplit_motion_mg_levels_ksp_type": "richardson",
-    "fieldsplit_motion_mg_levels_pc_type": "sor",
-    "fieldsplit_motion_mg_levels_ksp_max_it": 2,
+    "fieldsplit_motion_mg_levels_ksp_type": "chebyshev",
+    "fieldsplit_motion_mg_levels_ksp_max_it": 3,
+    "fieldsplit_motion_mg_levels_pc_type": "jacobi",
     "fieldsplit_pressure_ksp_type": "preonly",
     "fieldsplit_pressure_pc_type": "bjacobi",
 }
