@@ -9,9 +9,13 @@ import argparse
 import sys
 from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from fabfem import __version__
 from fabfem.parallel.world import ended_together, first, launched
+
+if TYPE_CHECKING:
+    from fabfem.case import Case
 
 DONE, NO_PICTURE, RED, BAD_INPUT, STOPPED, INTERRUPTED = 0, 1, 1, 2, 3, 130
 
@@ -66,12 +70,21 @@ def _solve(options: argparse.Namespace) -> int:
     folder, restart = options.out or Path("results") / options.case.stem, Restart(options.resume, options.branch)
     outcome = run_case(case, folder, quiet=options.quiet, restart=restart)
     if first() and not options.quiet:
-        print(outcome.summary())
+        print(outcome.summary(_error_class(case)))
     if outcome.status == "completed":
         if not launched():
             remember_cost(case, outcome.folder)
         return DONE
     return _fail(outcome.reason, INTERRUPTED if outcome.status == "interrupted" else STOPPED)
+
+
+def _error_class(case: "Case") -> str:
+    """Return the error class of the case's settings in a sentence, if a study of it is kept beside it."""
+    if not case.path.with_suffix(".study.json").is_file():
+        return ""
+    from fabfem.study.accuracy import accuracy_sentence
+
+    return accuracy_sentence(case)
 
 
 def _check(options: argparse.Namespace) -> int:
@@ -114,9 +127,14 @@ def _study(options: argparse.Namespace) -> int:
         found = study(options.case, _folder(options, "study"), options.quiet)
     except KeyboardInterrupt:
         return _fail("interrupted; runs that ended are kept, and the same command goes on from there", INTERRUPTED)
-    picture = draw(found.folder)
+    files = [found.folder / "study.csv", draw(found.folder)]
+    if options.keep:
+        from fabfem.case import read_case
+        from fabfem.study.accuracy import keep
+
+        files.append(keep(read_case(options.case), found.folder))
     if not options.quiet:
-        print(*found.sentences, f"  {found.folder / 'study.csv'}", f"  {picture}", sep="\n")
+        print(*found.sentences, *(f"  {file}" for file in files), sep="\n")
     return DONE
 
 
@@ -261,6 +279,10 @@ def _parser() -> argparse.ArgumentParser:
             "--out", type=Path, metavar="DIR", help=f"folder of the results (default: results/CASE_{name})"
         )
         runs.set_defaults(command=command)
+
+    commands.choices["study"].add_argument(
+        "--keep", action="store_true", help="keep the error of the case's own settings beside it, for solve to say"
+    )
 
     show = commands.add_parser("show", parents=[common], help="draw pictures of a result")
     show.add_argument("folder", type=Path, metavar="DIR")

@@ -23,12 +23,14 @@ class Outcome(NamedTuple):
     seconds: float
     """Wall time [s]."""
 
-    def summary(self) -> str:
-        """Return what the terminal shows when a run is over: how it ended and where to look."""
+    def summary(self, error: str = "") -> str:
+        """Return what the terminal shows when a run is over: how it ended, how wrong it is if known, where to look."""
         head = f"{self.status} after {self.increments} increments in {self.seconds:.1f} s"
         files = {"history": "history.csv", "fields": "fields.pvd", "report": "report.json"}
         places = [(name, str(self.folder / file)) for name, file in files.items() if (self.folder / file).is_file()]
-        return "\n".join([head, summary(self.last), "", summary([*places, ("pictures", f"fabfem show {self.folder}")])])
+        known = [("error", error)] if error else []
+        below = [*known, *places, ("pictures", f"fabfem show {self.folder}")]
+        return "\n".join([head, summary(self.last), "", summary(below)])
 
 
 class Description(NamedTuple):

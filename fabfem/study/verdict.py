@@ -1,6 +1,6 @@
 """What a study comes to: orders of convergence, the cheapest settings, and the error that dominates."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 from fabfem.case.study import Knob, Study
@@ -45,6 +45,15 @@ class Order(NamedTuple):
     """Slope of the errors of the finer runs; NaN where they are lost in rounding."""
     by_differences: float
     """Order that the three finest values show by themselves, whatever the truth; NaN where they show none."""
+
+
+class Standing(NamedTuple):
+    """Error of the case with its own settings."""
+
+    error: float
+    """Distance from the truth."""
+    shares: dict[str, float]
+    """What each knob changes when it alone is turned to its last value."""
 
 
 def orders(study: Study, rows: Sequence[Measured], values: Values, known: Known) -> Iterator[Order]:
@@ -110,20 +119,29 @@ def _cheapest(study: Study, rows: Sequence[Measured], largest: float, known: Kno
     )
 
 
-def _dominating(study: Study, rows: Sequence[Measured], values: Values) -> Iterator[str]:
-    """Yield which knob's error dominates at the case's own settings."""
+def standing(study: Study, rows: Sequence[Measured], values: Values) -> Standing | None:
+    """Return the error of the case as it stands; None if that run has no quantity of interest."""
     if () not in values:
-        return
+        return None
     shares = {
         knob.name: distance(values[()], values[(settings_of(knob)[-1],)])
         for knob in study.knob
         if not knob.set and (settings_of(knob)[-1],) in values
     }
-    if max(shares.values(), default=0.0) > ROUNDING:
-        worst = max(shares, key=lambda name: shares[name])
-        listed = ", ".join(f"{name} {100.0 * share:.2g} %" for name, share in shares.items())
-        total = next(row.error for row in rows if row.run.choice == ())
+    return Standing(next(row.error for row in rows if row.run.choice == ()), shares)
+
+
+def _dominating(study: Study, rows: Sequence[Measured], values: Values) -> Iterator[str]:
+    """Yield which knob's error dominates at the case's own settings."""
+    own = standing(study, rows, values)
+    if own is not None and max(own.shares.values(), default=0.0) > ROUNDING:
+        worst = max(own.shares, key=lambda name: own.shares[name])
         yield (
-            f"As the case stands the error is {100.0 * total:.2g} %; each knob turned alone to its last value changes "
-            f"the quantity: {listed}. The error of the {worst} dominates."
+            f"As the case stands the error is {100.0 * own.error:.2g} %; each knob turned alone to its last value "
+            f"changes the quantity: {listed(own.shares)}. The error of the {worst} dominates."
         )
+
+
+def listed(shares: Mapping[str, float]) -> str:
+    """Return the shares of the knobs in words."""
+    return ", ".join(f"{name} {100.0 * share:.2g} %" for name, share in shares.items())

@@ -27,7 +27,7 @@ from fabfem.study.store import Plan, Run, runs
 from fabfem.study.sweep import asked
 from fabfem.study.truth import Known, Values, finest, knob_named, truth
 from fabfem.study.variants import Choice, choices, one_at_a_time, settings_of
-from fabfem.study.verdict import Measured, orders, sentences
+from fabfem.study.verdict import Measured, orders, sentences, standing
 from umat.mandel import Array
 
 HEADERS = (
@@ -116,6 +116,7 @@ def _write(case: Case, said: Study, folder: Path, rows: Sequence[Measured], know
         writer.writerow([*_settings(said, row.run.choice), *_numbers(row), int(best), *_end(row)])
     write_atomic(folder / "study.csv", lines.getvalue())
     found = tuple(sentences(said, rows, known, values))
+    own = standing(said, rows, values)
     content = {
         "case": case.path.name,
         "title": case.title,
@@ -126,6 +127,7 @@ def _write(case: Case, said: Study, folder: Path, rows: Sequence[Measured], know
         "orders": [order._asdict() for order in orders(said, rows, values, known)],
         "rows": [_drawn(row, said, bool(best)) for row, best in zip(rows, front, strict=True)],
         "sentences": found,
+        "standing": own._asdict() if own else None,
     }
     write_atomic(folder / "study.json", json.dumps(_finite(content), indent=1) + "\n")
     return Studied(folder, found)

@@ -163,6 +163,26 @@ def test_a_study_tells_error_and_order(truth: str, turn: str, tube: Path, tmp_pa
     assert (tmp_path / "out" / "study.png").is_file()
 
 
+def test_a_run_says_the_error_class_that_the_study_of_its_case_found(
+    tube: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    text, out = TUBE + STUDY.replace("TRUTH", "truth = { exact = 1.9066666666666667 }"), str(tmp_path / "out")
+    tube.write_text(text, encoding="utf-8")
+    assert main(["solve", str(tube), "--out", out]) == DONE
+    assert "\n  error" not in capsys.readouterr().out
+    assert main(["study", str(tube), "--out", str(tmp_path / "study"), "--keep", "--quiet"]) == DONE
+    (own,) = [row for row in table(tmp_path / "study" / "study.csv") if not row["size"] and not row["increment"]]
+    assert 5e-4 < float(own["error"]) < 1e-3
+    assert main(["solve", str(tube), "--out", out]) == DONE
+    assert "\n  error     up to 0.1 % of u_a (its study: 0.083 %; size " in capsys.readouterr().out
+    tube.write_text(text.replace("size = 0.5", "size = 0.25"), encoding="utf-8")
+    assert main(["solve", str(tube), "--out", out]) == DONE
+    assert "\n  error     not known: the study kept beside the case was made when mesh" in capsys.readouterr().out
+    tube.with_suffix(".study.json").write_text("{", encoding="utf-8")
+    assert main(["solve", str(tube), "--out", out]) == DONE
+    assert "\n  error" not in capsys.readouterr().out
+
+
 def test_a_calibration_finds_what_made_the_data(tube: Path, tmp_path: Path) -> None:
     tube.write_text(TUBE + CALIBRATION, encoding="utf-8")
     lines = ["# made with E = 0.8", "tube,pressure,u"]
