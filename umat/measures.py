@@ -14,6 +14,9 @@ from numpy.typing import ArrayLike
 from .directions import AXES, Axis
 from .mandel import Array, cos3theta, deviator, dot, from_tensor, norm, principal, to_tensor
 
+HORIZONTAL = 1e-4
+"""Angle from −90° within which an axis counts as horizontal [deg]."""
+
 
 def ratio(above: ArrayLike, below: ArrayLike) -> Array:
     """Return above / below, NaN where below is 0."""
@@ -39,10 +42,14 @@ def intermediate(tensor: ArrayLike) -> Array:
 
 
 def inclination(tensor: ArrayLike, vertical: Axis = "z", horizontal: Axis = "x") -> Array:
-    """Return the (...) angle α of the major principal axis in a plane from the vertical [deg], −90 < α ≤ 90."""
+    """Return the (...) angle α of the major principal axis in a plane from the vertical [deg], −90 < α ≤ 90.
+
+    An axis within `HORIZONTAL` of −90° is at 90°, so that rounding does not turn it back and forth.
+    """
     full, v, h = to_tensor(tensor), AXES.index(vertical), AXES.index(horizontal)
     across, along = 2.0 * full[..., v, h], full[..., v, v] - full[..., h, h]
-    return np.where(np.hypot(across, along) > 0.0, 0.5 * np.degrees(np.arctan2(across, along)), np.nan)
+    angle = 0.5 * np.degrees(np.arctan2(across, along))
+    return np.where(np.hypot(across, along) > 0.0, np.where(angle < HORIZONTAL - 90.0, 90.0, angle), np.nan)
 
 
 def anisotropy(fabric: ArrayLike, loading: ArrayLike) -> Array:

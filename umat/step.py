@@ -40,6 +40,8 @@ class Task(NamedTuple):
     """(n, 6) direction of the leading strain (d)."""
     length: Array
     """(n,) leading strain (δ) [-]."""
+    longest: Array
+    """(n,) strain that one correction may add [-]; near a peak the tangent alone asks for far too much."""
 
 
 class Found(NamedTuple):
@@ -107,7 +109,7 @@ def _scale(leg: Leg, stress: Array, strain: Array) -> Array:
 
 
 def _corrected(task: Task, tangent: Array, missing: Array, rest: Array, fraction: Array) -> Array:
-    """Return the least correction (n, 7) of strain increment and fraction, along the tangent.
+    """Return the least correction (n, 7) of strain increment and fraction, along the tangent, or as long as it may be.
 
     rest: (n,) leading strain that is missing.
     """
@@ -129,7 +131,7 @@ def _corrected(task: Task, tangent: Array, missing: Array, rest: Array, fraction
     right[~good] = 0.0
     found = apply(np.asarray(np.linalg.pinv(matrix, rcond=UNDETERMINED), dtype=float), right)
     found[:, 6] = np.where(task.led, found[:, 6] / unit, 0.0)
-    return found
+    return found * np.minimum(1.0, task.longest / np.maximum(norm(found[:, :6]), np.finfo(float).tiny))[:, None]
 
 
 def _speed(course: Course, fraction: Array) -> Array:

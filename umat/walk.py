@@ -20,6 +20,9 @@ RUNNING, DONE, REFUSED, BEYOND, WATCHED = range(5)
 """What became of a point: under way; at the end of the leg; no step is small enough; led by its strain as far as it may
 be without reaching the end; stopped by the caller's watch."""
 
+FIRST, REACH, LEAST = 0.05, 3.0, 1e-4
+"""Longest correction of the strain: in the first step, over the strain of the step before, and at least [-]."""
+
 
 class Controls(NamedTuple):
     """How a leg is followed; sizes are fractions of the leg."""
@@ -107,7 +110,8 @@ class Way(NamedTuple):
         course = self.course or (lambda fraction: fraction[:, None] * leg.value)
         last = walk.last[ids]
         direction = last / np.maximum(norm(last), np.finfo(float).tiny)[:, None]
-        return Task(leg, course, walk.origin[ids], end, walk.led[ids], direction, length)
+        longest = np.where(norm(last) > 0.0, np.maximum(REACH * norm(last), LEAST), FIRST)
+        return Task(leg, course, walk.origin[ids], end, walk.led[ids], direction, length, longest)
 
 
 def _put(array: Array, ids: NDArray[np.intp], values: Array) -> Array:

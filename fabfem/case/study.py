@@ -28,12 +28,10 @@ class Parameter(Table):
     """Values that it takes."""
     set: dict[str, Value] = Field(default={})
     """Values by place that go with all of them."""
-    each: bool = False
-    """Whether each value is a list, with an entry for each place."""
-    labels: Names | None = None
-    """Names of the values in tables and pictures; the values themselves when left out."""
     along: dict[str, Values] = Field(default={})
     """Values by place, one for each of `values`, that go with it."""
+    labels: Names | None = None
+    """Names of the values in tables and pictures; the values when left out, with those along where two are equal."""
 
     @model_validator(mode="after")
     def _as_many(self) -> "Parameter":
@@ -46,9 +44,6 @@ class Parameter(Table):
     def _listed(self) -> "Parameter":
         if self.labels is not None and len(self.labels) != len(self.values):
             raise ValueError(f"has {len(self.values)} values and {len(self.labels)} labels")
-        for number, value in enumerate(self.values if self.each else (), 1):
-            if not isinstance(value, tuple) or len(value) != len(self.at):
-                raise ValueError(f"value {number} must be a list of {len(self.at)}, an entry for each place")
         return self
 
 

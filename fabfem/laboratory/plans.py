@@ -4,12 +4,13 @@ The vertical is z, principal axes turn towards x. All targets count from the sta
 legs drifts from no condition.
 """
 
+from collections.abc import Sequence
 from functools import singledispatch
 from typing import NamedTuple
 
 import numpy as np
 
-from fabfem.case import element as said
+from fabfem.case import paths as said
 from umat import legs
 from umat.mandel import FACTOR, IDENTITY, Array, from_tensor, rotation
 from umat.step import Course
@@ -156,10 +157,27 @@ PLANES = {
 }
 
 
+def basis(plane: str | Sequence[Sequence[float]]) -> Array:
+    """Return two orthogonal unit vectors (2, 6) of a plane of probes, known by its name or by two tensors in it.
+
+    Raises
+    ------
+    ValueError
+        If the two tensors span no plane.
+    """
+    if isinstance(plane, str):
+        return np.asarray(PLANES[plane])
+    found, rest = np.linalg.qr((np.array(plane) * FACTOR).T)
+    size = np.abs(np.diag(rest))
+    if not size.min() > 1e-6 * np.linalg.norm(rest):
+        raise ValueError("plane: its two tensors must differ in direction")
+    return np.asarray((found * np.sign(np.diag(rest))).T)
+
+
 def probes(stage: said.Probe) -> tuple[Array, legs.Leg]:
     """Return angles (n,) [deg] from the first vector of the plane to the second, and the leg of each probe."""
     angles = np.linspace(0.0, 360.0, stage.directions, endpoint=False)
     turn = np.radians(angles)[:, None]
-    first, second = PLANES[stage.plane]
+    first, second = basis(stage.plane)
     leg = legs.stressed if stage.of == "stress" else legs.strained
     return angles, leg(stage.size * (np.cos(turn) * first + np.sin(turn) * second))

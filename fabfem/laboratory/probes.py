@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from fabfem.case.element import Probe
+from fabfem.case.paths import Probe
 from fabfem.laboratory.columns import COMPONENTS
 from fabfem.laboratory.plans import probes
 from fabfem.laboratory.specimen import Specimen

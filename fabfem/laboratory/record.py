@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 import umat
-from fabfem.case.element import Path, Probe
+from fabfem.case.paths import Path, Probe
 from fabfem.failures import clear as clear_failures
 from fabfem.laboratory.columns import COMPONENTS, Row, zeta
 from fabfem.laboratory.landmarks import Rows, interpolated, landmarks

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from fabfem.case import CaseError, ElementCase
-from fabfem.case.element import Path, Probe
+from fabfem.case.paths import Path, Probe
 from fabfem.failures import keep_stage
 from fabfem.identity import identity
 from fabfem.laboratory.record import PHASES, STANDING, Reached, Recorder, Written

@@ -11,10 +11,10 @@ import numpy as np
 
 import umat
 from fabfem.case import CaseError, ElementCase, suggest
-from fabfem.case.element import Path
 from fabfem.case.materials import ChangHicher
+from fabfem.case.paths import Path
 from fabfem.laboratory.columns import MEASURES, Column, Zeta, columns
-from fabfem.laboratory.plans import plan
+from fabfem.laboratory.plans import basis, plan
 from fabfem.substance import MisfitError, Substance, Surroundings, substance
 from umat import contacts
 from umat.mandel import FACTOR, IDENTITY, Array
@@ -71,6 +71,9 @@ def build(case: ElementCase) -> Specimen:
         if isinstance(stage, Path):
             with _blamed(case, f"stage[{stage.name}]"):
                 plan(stage, state.stress[0])
+        else:
+            with _blamed(case, f"stage[{stage.name}]"):
+                basis(stage.plane)
     found = columns(case.output.measures, case.unit_system)
     return Specimen(case, material, filling.directions, state, found, _zeta(case, material), _left_out(case, filling))
 

@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fabfem.case.element import Path
+from fabfem.case.paths import Path
 from fabfem.laboratory.plans import plan
 from fabfem.laboratory.specimen import Specimen
 from umat import mandel, status

@@ -8,6 +8,7 @@ import csv
 import json
 from itertools import cycle
 from pathlib import Path
+from textwrap import fill
 from typing import Any
 
 import numpy as np
@@ -22,6 +23,8 @@ from fabfem.case import CaseError, suggest
 STYLES = ("-", "--", ":", "-.", (0, (6, 1, 1, 1, 1, 1)), (0, (1, 3)))
 MANY = 3
 """Panels side by side."""
+KEY = 1.4
+"""Width of an entry of the key [inch]."""
 
 
 def draw(folder: Path) -> tuple[Path, ...]:
@@ -83,7 +86,7 @@ def _picture(folder: Path, picture: Any, curves: Any, headers: dict[str, str], t
         ax.tick_params(labelbottom=True)
         ax.set_visible(number < len(panels))
     _key(figure, paths, colours)
-    figure.suptitle(title, fontsize=9)
+    figure.suptitle(fill(title, int(13 * figure.get_figwidth())), fontsize=9)
     FigureCanvasAgg(figure)
     file = folder / f"{picture['name']}.png"
     figure.savefig(file, dpi=110)
@@ -121,7 +124,8 @@ def _key(figure: Figure, paths: list[str], colours: Any) -> None:
     """Draw the key of the paths, if there are several."""
     if len(paths) > 1:
         lines = [Line2D([], [], color=colours[path]) for path in paths]
-        figure.legend(lines, paths, fontsize=7, frameon=False, loc="outside lower center", ncols=min(len(paths), 6))
+        columns = min(len(paths), max(2, int(figure.get_figwidth() / KEY)))
+        figure.legend(lines, paths, fontsize=7, frameon=False, loc="outside lower center", ncols=columns)
 
 
 def _label(header: str) -> str:

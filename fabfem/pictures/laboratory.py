@@ -12,7 +12,9 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from fabfem.laboratory.plans import basis
 from fabfem.output.history import read_history
+from umat.mandel import FACTOR
 
 Array = NDArray[np.float64]
 
@@ -160,7 +162,7 @@ def _envelopes(folder: Path, report: dict[str, Any]) -> Path | None:
             closed = np.vstack([points, points[:1]])
             panel.plot(*closed.T, ".-", color=COLOURS[k % len(COLOURS)], linewidth=1.2, label=stage["name"])
     for panel, what in zip(axes, ("stress", "strain"), strict=False):
-        first, second = AXES[stages[0]["plane"]]
+        first, second = AXES[stages[0]["plane"]] if isinstance(stages[0]["plane"], str) else SPANNING
         panel.set(xlabel=f"Δ{what} along {second}", ylabel=f"Δ{what} along {first}", aspect="equal")
         panel.set_title("stress" if what == "stress" else "strain", fontsize=10)
         _plain(panel)
@@ -177,18 +179,15 @@ AXES = {
 """Names of the two axes of each plane of probes."""
 
 
-def _in_plane(row: dict[str, str], what: str, plane: str) -> tuple[float, float]:
+SPANNING = ("the first tensor", "the second, across it")
+"""Names of the axes of a plane that two tensors span."""
+
+
+def _in_plane(row: dict[str, str], what: str, plane: str | list[list[float]]) -> tuple[float, float]:
     """Return the coordinates of a change of stress or strain in the plane of its probes: across, up."""
-    columns = {key.removeprefix(f"d_{what}_")[:2]: key for key in row if key.startswith(f"d_{what}_")}
-    found = {name: float(row[key]) for name, key in columns.items()}
-    x, y, z, root = found["xx"], found["yy"], found["zz"], 2.0**0.5
-    places = {
-        "triaxial": ((x + y) / root, z),
-        "biaxial": (x, z),
-        "deviatoric": ((x - y) / root, (2.0 * z - x - y) / 6.0**0.5),
-        "torsion": (root * found["xz"], (z - x) / root),
-    }
-    return places[plane]
+    change = np.array([float(value) for key, value in row.items() if key.startswith(f"d_{what}_")]) * FACTOR
+    up, across = basis(plane) @ change
+    return float(across), float(up)
 
 
 def _figure(panels: int, title: str) -> tuple[Figure, Sequence[Axes]]:

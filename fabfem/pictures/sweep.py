@@ -171,6 +171,7 @@ def _plain(ax: Axes, x: str, y: str, units: dict[str, str]) -> None:
     ax.xaxis.label.set_fontsize(9)
     ax.yaxis.label.set_fontsize(9)
     ax.tick_params(labelsize=8)
+    ax.locator_params(axis="x", nbins=6)
     ax.grid(alpha=0.3)
     ax.spines[["top", "right"]].set_visible(False)
 

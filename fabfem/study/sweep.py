@@ -1,8 +1,9 @@
 """A sweep: the product of some parameters of a case, collected in one table, ``sweep.csv``.
 
 Each run has its row, or with ``rows = "all"`` each row of its history: the parameters, how the run ended, what it took,
-and the columns of the history. A run that did not complete has its row too. ``sweep.json`` says what the pictures need;
-where they show states, ``states.csv`` has them, and measured curves come with ``measured.csv``.
+and the columns of the history, as ``NAME_history`` where a parameter has the name. A run that did not complete has its
+row too. ``sweep.json`` says what the pictures need; where they show states, ``states.csv`` has them, and measured
+curves come with ``measured.csv``.
 """
 
 import csv
@@ -120,7 +121,8 @@ def _write(table: Path, said: Sweep, ended: Sequence[Run], case: str) -> None:
     headers = headers if said.columns is None else [_header(name, headers, case) for name in said.columns]
     lines = StringIO()
     writer = csv.writer(lines, lineterminator="\n")
-    writer.writerow([parameter.name for parameter in said.parameter] + list(ABOUT) + headers)
+    parameters = [parameter.name for parameter in said.parameter]
+    writer.writerow(parameters + list(ABOUT) + [_beside(parameters, header) for header in headers])
     for run, known, rows in found:
         for row in _rows(rows, said):
             writer.writerow(
@@ -145,6 +147,12 @@ def _about(run: Run) -> list[Any]:
     seconds = f"{median(run.ran.wall):.3f}" if run.ran.wall else ""
     went = [run.ran.status, run.ran.reason, seconds, f"{run.ran.memory:.0f}", f"runs/{run.folder.name}"]
     return [*(text(setting.value) for setting in run.choice), *went]
+
+
+def _beside(parameters: Sequence[str], header: str) -> str:
+    """Return the header of a column of the histories, which a parameter of the same name leaves as NAME_history."""
+    name = name_of(header)
+    return f"{name}_history{header[len(name) :]}" if name in parameters else header
 
 
 def _header(name: str, headers: Sequence[str], case: str) -> str:

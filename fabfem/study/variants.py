@@ -17,6 +17,9 @@ Tables = dict[str, Any]
 ABOUT_RUNS = ("sweep", "study", "calibration")
 """Tables of a case that say nothing about its own run."""
 
+Placed = tuple[tuple[str, Any], ...]
+"""Values by place."""
+
 _STEP = re.compile(r"(?P<key>[A-Za-z_][\w\-]*)(?:\[(?P<entry>[^\]]+)\])?(?:\.|\Z)")
 
 
@@ -26,7 +29,7 @@ class Setting(NamedTuple):
     name: str
     places: tuple[str, ...]
     value: Any
-    also: tuple[tuple[str, Any], ...] = ()
+    also: Placed = ()
     """Places with values of their own."""
 
 
@@ -71,24 +74,30 @@ def one_at_a_time(parameters: Sequence[Parameter]) -> list[Choice]:
 
 
 def settings_of(parameter: Parameter) -> list[Setting]:
-    """Return the settings that a parameter takes."""
-    return [_setting(parameter, number) for number in range(len(parameter.values))]
+    """Return the settings that a parameter takes; one that is not known by its value has that in `also`."""
+    known = parameter.labels or _told_apart(parameter)
+    rows = zip(parameter.values, known, _along(parameter), strict=True)
+    return [_setting(parameter, value, shown, along) for value, shown, along in rows]
 
 
-def _setting(parameter: Parameter, number: int) -> Setting:
-    """Return a setting; one that is known by a label, or has a value for each place, has its values in `also`."""
-    value, also = parameter.values[number], _also(parameter, number)
-    label = parameter.labels[number] if parameter.labels else None
-    if not parameter.each and label is None:
+def _setting(parameter: Parameter, value: Any, shown: Any, along: Placed) -> Setting:
+    also = (*parameter.set.items(), *along)
+    if shown is value:
         return Setting(parameter.name, parameter.at, value, also)
-    entries = value if parameter.each and isinstance(value, tuple) else [value] * len(parameter.at)
-    shown = value if label is None else label
-    return Setting(parameter.name, (), shown, (*also, *zip(parameter.at, entries, strict=True)))
+    return Setting(parameter.name, (), shown, (*also, *((place, value) for place in parameter.at)))
 
 
-def _also(parameter: Parameter, number: int) -> tuple[tuple[str, Any], ...]:
-    """Return what goes with a value, by place."""
-    return (*parameter.set.items(), *((place, values[number]) for place, values in parameter.along.items()))
+def _along(parameter: Parameter) -> list[Placed]:
+    """Return what goes with each value, by place."""
+    return [tuple((place, row[k]) for place, row in parameter.along.items()) for k in range(len(parameter.values))]
+
+
+def _told_apart(parameter: Parameter) -> Sequence[Any]:
+    """Return the values, or, where two are equal, texts of them with what goes along."""
+    if len(set(parameter.values)) == len(parameter.values):
+        return parameter.values
+    rows = zip(parameter.values, *parameter.along.values(), strict=True)
+    return [" ".join(str(_plain(value)) for value in row) for row in rows]
 
 
 class _Entry(NamedTuple):

@@ -12,6 +12,7 @@ from typing import Any
 import meshio
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from fabfem.case import CaseError, case_from
 from fabfem.case.toml import write_toml
@@ -22,6 +23,7 @@ from fabfem.laboratory.run import describe
 from fabfem.laboratory.specimen import build
 from fabfem.laboratory.stages import End, path
 from fabfem.output.history import read_history
+from fabfem.pictures.show import show
 from fabfem.run import run_case
 from umat import mandel
 from umat.lanes import COMPILED
@@ -121,6 +123,43 @@ def test_conditions_of_every_path_are_met_in_every_row(name: str, material: str)
     np.testing.assert_allclose(point.fraction, 1.0)
 
 
+@pytest.mark.parametrize("material", MATERIALS)
+@pytest.mark.parametrize("seed", range(4))
+def test_any_six_conditions_are_met_in_any_axes(seed: int, material: str) -> None:
+    """Six random combinations of `seed` stresses, 3 strains and 3 - `seed` sums of both along six orthogonal tensors.
+
+    In random axes, whose components are found with scipy's rotations.
+    """
+    random = np.random.default_rng(seed)
+    axes = random.uniform(-180.0, 180.0, 3)
+    along = np.linalg.qr(random.normal(size=(6, 6)))[0] * FACTOR
+    mixed = np.eye(6) + 0.3 * random.normal(size=(6, 6))
+    share = np.array([1.0] * seed + [0.5] * (3 - seed) + [0.0] * 3)[:, None]
+    on_stress, on_strain = mixed @ (share * along), mixed @ ((1.0 - share) * 6e4 * along)
+    turn = Rotation.from_euler("ZYX", axes, degrees=True).as_matrix()
+    wanted = on_strain @ _components(random.normal(size=6) * 3e-4, turn)
+    names = ("xx", "yy", "zz", "yz", "xz", "xy")
+    conditions = [
+        {"stress": dict(zip(names, a, strict=True)), "strain": dict(zip(names, b, strict=True)), "value": value}
+        for a, b, value in zip(on_stress.tolist(), on_strain.tolist(), wanted.tolist(), strict=True)
+    ]
+    stage = {"kind": "free", "axes": axes.tolist(), "conditions": conditions, "increments": 4}
+    specimen = build(case_from(tables(MATERIALS[material], stage)))  # type: ignore[arg-type]
+    *points, end = path(specimen, specimen.case.stage[0], specimen.state, np.zeros(6))  # type: ignore[arg-type]
+    assert end.status == "completed", end.reason  # type: ignore[union-attr]
+    scale = np.linalg.norm(on_stress, axis=1) * 100.0
+    for point in points:  # type: ignore[assignment]
+        stress = _components(point.state.stress[0] - specimen.state.stress[0], turn)  # type: ignore[union-attr]
+        done = on_stress @ stress + on_strain @ _components(point.strain, turn)  # type: ignore[union-attr]
+        assert (np.abs(done - point.fraction * wanted) / scale).max() < 1e-8  # type: ignore[union-attr]
+
+
+def _components(tensor: np.ndarray, turn: np.ndarray) -> np.ndarray:
+    """Return the six components of a Mandel vector in axes that are the columns of a rotation."""
+    turned = turn.T @ mandel.to_tensor(tensor) @ turn
+    return turned[[0, 1, 2, 1, 0, 0], [0, 1, 2, 2, 2, 1]]
+
+
 @pytest.mark.parametrize(("alpha", "b"), [(0.0, 0.5), (30.0, 0.25), (45.0, 0.5), (75.0, 0.8)])
 @pytest.mark.parametrize("drainage", ["drained", "undrained"])
 def test_axes_and_intermediate_stress_are_held(alpha: float, b: float, drainage: str, tmp_path: Path) -> None:
@@ -179,6 +218,41 @@ def test_stress_control_passes_the_limit_of_mohr_coulomb(tmp_path: Path) -> None
     late = columns["eps_q"] > 0.02
     slope = np.polyfit(columns["strain_zz"][late], columns["eps_v"][late], 1)[0]
     assert -slope == pytest.approx(2 * np.sin(np.radians(10)) / (1 - np.sin(np.radians(10))), rel=1e-4)
+
+
+UNDRAINED = {
+    # stage, largest and least stress where ψ = 0: σ1 = 3 σ3, p = 100 kPa
+    "compression": ({"kind": "triaxial", "axial_strain": 0.05}, 180.0, 60.0),
+    "extension": ({"kind": "triaxial", "axial_strain": -0.05}, 900.0 / 7.0, 300.0 / 7.0),
+    "true triaxial": ({"kind": "true_triaxial", "b": 0.5, "shear_strain": 0.05}, 150.0, 50.0),
+    "torsion": ({"kind": "hollow_cylinder", "alpha": 45.0, "b": 0.5, "shear_strain": 0.05}, 150.0, 50.0),
+    "turned torsion": (
+        {"kind": "hollow_cylinder", "alpha": 30.0, "b": 0.25, "shear_strain": 0.05},
+        1800 / 11,
+        600 / 11,
+    ),
+    "plane strain": ({"kind": "plane_strain", "axial_strain": 0.05}, 150.0, 50.0),
+    "simple shear": ({"kind": "simple_shear", "shear_strain": 0.05}, 150.0, 50.0),
+    "by stress": ({"kind": "hollow_cylinder", "alpha": 45.0, "b": 0.5, "q": 200.0}, 150.0, 50.0),
+}
+
+
+@pytest.mark.parametrize("dilation", [0.0, 10.0, 30.0])
+@pytest.mark.parametrize("name", UNDRAINED)
+def test_undrained_mohr_coulomb_goes_on_after_yield(name: str, dilation: float, tmp_path: Path) -> None:
+    """φ = 30°: with ψ = 0 the stress stays where p and the cone meet, with ψ > 0 it climbs along σ1 = 3 σ3."""
+    stage, major, minor = UNDRAINED[name]
+    material = {**COULOMB, "dilation_angle": dilation}
+    output = {"measures": ["p", "sigma_1", "sigma_3"]}
+    columns, report = run(tmp_path, material, {**stage, "drainage": "undrained", "increments": 10}, output=output)
+    ended = "beyond_peak" if dilation == 0.0 and "q" in stage else "completed"
+    assert report["stages"][0]["status"] == ended
+    if dilation == 0.0:
+        assert columns["sigma_1"][-1] == pytest.approx(major, rel=1e-7)
+        assert columns["sigma_3"][-1] == pytest.approx(minor, rel=1e-7)
+    else:
+        assert columns["sigma_1"][-1] == pytest.approx(3.0 * columns["sigma_3"][-1], rel=1e-7)
+        assert columns["p"][-1] > 110.0
 
 
 def test_stress_control_passes_the_peak_of_sand_on_the_curve_of_strain_control(tmp_path: Path) -> None:
@@ -273,6 +347,24 @@ def test_elastic_envelopes_are_the_ellipses_of_the_moduli(tmp_path: Path) -> Non
         assert size == pytest.approx(1.0, rel=1e-9)
 
 
+def test_probes_go_in_all_directions_of_any_plane(tmp_path: Path) -> None:
+    """Of one length, in the plane of two tensors, opposite ones opposite; sand answers a full envelope."""
+    first, second = [0.0, 0.0, 0.0, 1.0, 0.0, 0.0], [0.2, 0.3, 0.5, 0.0, 0.7, -0.4]
+    probe = {"kind": "probe", "of": "stress", "size": 0.5, "plane": [first, second], "directions": 8}
+    run(tmp_path, SAND, probe, {**probe, "of": "strain", "size": 1e-6})
+    with (tmp_path / "probes.csv").open(encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    assert len(rows) == 16
+    plane = np.array([first, second]) * FACTOR
+    for number, row in enumerate(rows):
+        what, size = ("stress", 0.5) if number < 8 else ("strain", 1e-6)
+        driven = np.array([float(value) for key, value in row.items() if key.startswith(f"d_{what}_")]) * FACTOR
+        part = np.linalg.lstsq(plane.T, driven, rcond=None)
+        np.testing.assert_allclose(plane.T @ part[0], driven, atol=1e-6 * size)
+        assert mandel.norm(driven) == pytest.approx(size, rel=1e-6)
+    assert show(tmp_path).pictures
+
+
 def test_states_are_found_where_a_curve_has_them() -> None:
     """Parabolas with known vertices between the rows: q at 0.31, p at 0.52 of the way."""
     way = np.linspace(0.0, 1.0, 21)
@@ -322,6 +414,12 @@ BAD = {
         "material.soil: the stress lies outside the domain",
     ),
     "two materials": (lambda t: t["material"].update(other=dict(ELASTIC)), "an element has one material"),
+    "probes of no plane": (
+        lambda t: t.update(
+            stage=[{"name": "f", "kind": "probe", "of": "stress", "size": 1.0, "plane": [[1.0] * 6] * 2}]
+        ),
+        "stage[f]: plane: its two tensors must differ in direction",
+    ),
     "five conditions": (
         lambda t: t.update(stage=[{"name": "f", "kind": "free", "conditions": [{"stress": {"xx": 1.0}}] * 5}]),
         "stage[f].conditions: must hold at least 6 entries",

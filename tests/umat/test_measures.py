@@ -106,6 +106,11 @@ def test_inclination_and_ratio_of_a_stress_made_with_them(alpha):
     assert measures.intermediate(stress) == pytest.approx(0.3, abs=1e-12)
 
 
+@pytest.mark.parametrize("rounding", [-1e-16, 0.0, 1e-16])
+def test_a_horizontal_axis_is_not_turned_by_rounding(rounding):
+    assert measures.inclination([1.0, 0.0, 0.0, 0.0, rounding, 0.0]) == pytest.approx(90.0, abs=1e-10)
+
+
 @pytest.mark.parametrize("localisation", ["total", "rate"])
 def test_forces_of_contacts_are_linear_in_the_normal(localisation):
     """T n at the normals of the rule is the force that the model has there; ⟨f n⟩ gives the stress back."""

@@ -145,3 +145,33 @@ def test_wrong_legs_are_refused():
         path.follow(ELASTIC, None, state, path.triaxial(0.1), 0)
     with pytest.raises(ValueError, match="are both z"):
         path.undrained(0.1, vertical="z", horizontal="z")
+
+
+@pytest.mark.skipif(not COMPILED, reason="takes the compiler")
+def test_an_undrained_path_ends_where_strain_no_longer_determines_stress():
+    """With few directions: the compliance loses a double eigenvalue, the stiffness has a pole, the conditions have not.
+
+    At a limit point of the path their least singular value would vanish, and strain would take the lead.
+    """
+    sand, rule = toyoura()._replace(tolerance=1e-3), directions("bazant_oh_37")
+    deposit = 0.208 / 6.0**0.5 * np.array([-1.0, -1.0, 2.0, 0.0, 0.0, 0.0])
+    state = umat.initial_state(sand, rule, START, void_ratio=0.82, fabric=deposit)
+    leg = path.undrained(0.5)
+    compliance, conditions, before = {}, {}, state
+    for moment in path.march(sand, rule, state, leg, 25, path.Controls(error=5e-4, beyond=0.2)):
+        elastic = umat.elastic_tangent(sand, moment.state)[0]
+        strain = 1e-7 * np.array([[-0.5, -0.5, 1.0, 0.0, 0.0, 0.0]])
+        tangent = umat.update(sand, rule, strain, moment.state).tangent[0]
+        size = np.where(mandel.norm(leg.on_stress) > 0.0, np.linalg.norm(elastic), 1.0)[:, None]
+        compliance[round(moment.fraction[0], 2)] = np.sort(np.linalg.eigvals(np.linalg.inv(tangent) @ elastic).real)
+        conditions[round(moment.fraction[0], 2)] = (leg.on_stress @ tangent + leg.on_strain) / size
+        before = moment
+    assert before.ended == path.REFUSED
+    assert before.code == 0  # the material refuses nothing
+    assert 0.18 < before.fraction < 0.3
+    double = [compliance[place][1:3] for place in (0.08, 0.12, 0.16)]
+    assert all(np.ptp(pair) < 1e-3 * pair[0] for pair in double)
+    assert double[0][0] > double[1][0] > double[2][0] > 0.0
+    assert np.linalg.svd(conditions[0.16], compute_uv=False)[-1] > 0.002
+    assert np.linalg.svd(conditions[max(conditions)], compute_uv=False)[-1] > 0.002
+    assert double[2][0] < 0.6 * double[0][0]

@@ -43,9 +43,9 @@ workers = 1
 
 [[sweep.parameter]]
 name = "test"
-at = ["initial.p", "material.rock.youngs_modulus"]
-each = true
-values = [[100.0, 1e4], [200.0, 2e4]]
+at = "initial.p"
+values = [100.0, 200.0]
+along = { "material.rock.youngs_modulus" = [1e4, 2e4] }
 labels = ["soft", "stiff"]
 """
 PICTURE = """
@@ -93,6 +93,16 @@ def test_values_of_several_places_go_together(swept, label, pressure, modulus):
     assert float(mine[-1]["gamma [-]"]) == pytest.approx(0.012, rel=1e-8)  # (1 + nu) times the axial strain
 
 
+def test_no_two_columns_have_one_name(tmp_path):
+    """A parameter p has the values asked for, a measure p those of the history: both are kept."""
+    file = written(tmp_path, CASE.replace('name = "test"', 'name = "p"'))
+    assert main(["sweep", str(file), "--out", str(tmp_path / "out"), "--quiet"]) == 0
+    found = rows(tmp_path / "out" / "sweep.csv")
+    assert {row["p"] for row in found} == {"soft", "stiff"}
+    assert float(found[0]["p_history [kPa]"]) == 100.0
+    assert "p [kPa]" not in found[0]
+
+
 def test_measured_curves_are_compared_up_to_the_end_of_the_run(swept):
     found = {row["test"]: row for row in rows(swept / "measured.csv")}
     assert int(found["soft"]["points"]) == 2  # the point at 2 % lies beyond the end
@@ -121,12 +131,12 @@ def test_a_picture_ends_where_it_is_told(swept):
 WRONG = {
     "there is no parameter 'tset'; did you mean 'test'": PICTURE + 'colour = "tset"\n',
     "x and y must be lists of one length": PICTURE.replace('["gamma", "p"]', '["gamma"]'),
-    "value 2 must be a list of 2": "",
+    "2 values, but 1 along with them for material.rock.youngs_modulus": "",
     "2 values and 1 labels": "",
     "draws whole histories": PICTURE,
 }
 CHANGES = {
-    "value 2 must be a list of 2": ("[200.0, 2e4]", "[200.0]"),
+    "2 values, but 1 along with them for material.rock.youngs_modulus": ("[1e4, 2e4]", "[1e4]"),
     "2 values and 1 labels": ('"soft", "stiff"', '"soft"'),
     "draws whole histories": ('rows = "all"', 'rows = "last"'),
 }
@@ -249,7 +259,8 @@ def test_the_tests_of_khayyer_are_108():
     case = read_case(ROOT / "cases" / "element" / "khayyer_13_15_states.toml")
     assert case.sweep is not None
     (parameter,) = case.sweep.parameter
-    wanted = [f"CI{'U' if how == 'undrained' else 'D'}-{p:.0f}-{e:.3f}" for p, e, how in parameter.values]
+    tests = zip(parameter.values, *parameter.along.values(), strict=True)
+    wanted = [f"CI{'U' if how == 'undrained' else 'D'}-{p:.0f}-{e:.3f}" for p, e, how in tests]
     assert list(parameter.labels or ()) == wanted
     assert [sum(name.startswith(kind) for name in wanted) for kind in ("CIU", "CID")] == [54, 54]
 

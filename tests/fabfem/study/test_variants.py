@@ -79,3 +79,15 @@ def test_values_go_along_with_their_own() -> None:
     assert made == [{"a": {"x": 1.0, "y": 10.0}, "b": "p"}, {"a": {"x": 2.0, "y": 20.0}, "b": "q"}]
     with pytest.raises(ValueError, match=r"has 2 values, but 1 along with them for a\.y"):
         Parameter(name="angle", at="a.x", values=(1.0, 2.0), along={"a.y": (10.0,)})
+
+
+def test_equal_values_are_told_apart_by_what_goes_along() -> None:
+    tests = Parameter(name="test", at="a.x", values=(1.0, 1.0, 2.0), along={"a.y": (10.0, 20.0, 10.0)})
+    made = choices([tests])
+    assert [setting.value for (setting,) in made] == ["1.0 10.0", "1.0 20.0", "2.0 10.0"]
+    assert [variant({}, choice)["a"] for choice in made] == [{"x": 1.0, "y": y} for y in (10.0, 20.0)] + [
+        {"x": 2.0, "y": 10.0}
+    ]
+    named = Parameter(name="test", at=("a.x", "b"), values=(1.0, 1.0), along={"c": (1, 2)}, labels=("p", "q"))
+    assert [setting.value for (setting,) in choices([named])] == ["p", "q"]
+    assert variant({}, choices([named])[1]) == {"a": {"x": 1.0}, "b": 1.0, "c": 2}
