@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING
 
 from fabfem import __version__
 from fabfem.authoring import add_commands
+from fabfem.parallel.world import ended_together, first, launched
 
 if TYPE_CHECKING:
     from fabfem.case import Case
@@ -33,9 +34,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """
     options = _parser().parse_args(arguments)
     try:
-        with warnings.catch_warnings():
+        with warnings.catch_warnings(), ended_together(options.debug):
             if not options.debug:  # numbers out of all proportion overflow; what is not finite is refused with a reason
                 warnings.filterwarnings("ignore", category=RuntimeWarning, module="numpy|scipy")
+            if launched() and options.command not in (_solve, _check):
+                return _fail("several processes share 'solve' and 'check', no other command", BAD_INPUT)
             return options.command(options)
     except KeyboardInterrupt:
         return _fail("interrupted before the first increment", INTERRUPTED)
@@ -60,7 +63,8 @@ def _explained(error: Exception) -> int:
 
 
 def _fail(message: str, status: int) -> int:
-    print(f"fabfem: {message}", file=sys.stderr)
+    if first():
+        print(f"fabfem: {message}", file=sys.stderr)
     return status
 
 
@@ -70,12 +74,15 @@ def _solve(options: argparse.Namespace) -> int:
     from fabfem.run import remember_cost, run_case
 
     case = read_case(options.case)
+    if case.scene.kind != "boundary_value" and not first():
+        return DONE  # what has no mesh is done by one process
     folder, restart = options.out or Path("results") / options.case.stem, Restart(options.resume, options.branch)
     outcome = run_case(case, folder, quiet=options.quiet, restart=restart)
-    if not options.quiet:
+    if first() and not options.quiet:
         print(outcome.summary(_error_class(case)))
     if outcome.status == "completed":
-        remember_cost(case, outcome.folder)
+        if not launched():
+            remember_cost(case, outcome.folder)
         return DONE
     return _fail(outcome.reason, INTERRUPTED if outcome.status == "interrupted" else STOPPED)
 
@@ -96,7 +103,7 @@ def _check(options: argparse.Namespace) -> int:
 
     case = read_case(options.case)
     description = describe_case(case)
-    if not options.quiet:
+    if first() and not options.quiet:
         print(resolved(case))
         print("# What the scene leaves out:", *description.omitted, sep="\n#   ")
         cost = price_case(case) if options.price else ""

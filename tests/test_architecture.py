@@ -13,7 +13,7 @@ ROOT = Path(__file__).parents[1]
 ORDER = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
 FOLDERS = {"cases", "docs", "fabfem", "meshes", "tests", "umat"}
 PACKAGES = [
-    *("umat", "fabfem", "fabfem/fem", "fabfem/boundary_value"),
+    *("umat", "fabfem", "fabfem/fem", "fabfem/parallel", "fabfem/boundary_value"),
     *("fabfem/laboratory", "fabfem/fabric_tests", "fabfem/study", "fabfem/verification", "fabfem/extremes"),
 ]
 OUTSIDE = {"umat": {"llvmlite", "numba", "numpy", "scipy"}}

@@ -14,7 +14,9 @@ from fabfem.boundary_value.problem import Problem
 from fabfem.case.stages import Geostatic, Gravity
 from fabfem.fem.increment import Increment
 from fabfem.fem.model import stress_of
+from fabfem.fem.space import Space
 from fabfem.fem.supports import constrain
+from umat.mandel import Array
 
 BALANCED = 1e-6
 """Relative out-of-balance force below which a guess is in balance."""
@@ -31,7 +33,7 @@ def audit(problem: Problem, increment: Increment) -> dict[str, Any]:
     found: dict[str, Any] = {
         "stage": increment.stage,
         "out_of_balance": increment.out_of_balance if geostatic else increment.residuals[-1],
-        "moved": float(np.linalg.norm(problem.model.space.displacement(increment.displacement), axis=1).max()),
+        "moved": _farthest(problem.model.space, increment.displacement),
         "yielded": yielded(problem, increment),
     }
     if geostatic and found["out_of_balance"] > BALANCED:
@@ -48,7 +50,13 @@ def yielded(problem: Problem, increment: Increment) -> float | None:
         strain = umat.state_fields(zone.material, increment.states[name]).get("plastic_strain")
         if strain is not None:
             known, total = known + volume[strain > 0.0].sum(), total + volume.sum()
+    known, total = space.mesh.ranks.sum(known), space.mesh.ranks.sum(total)
     return float(known / total) if total else None
+
+
+def _farthest(space: Space, displacement: Array) -> float:
+    """Return the largest displacement of a node."""
+    return space.mesh.ranks.largest(float(np.linalg.norm(space.displacement(displacement), axis=1).max()))
 
 
 def _worst(problem: Problem, increment: Increment) -> dict[str, Any]:
@@ -57,9 +65,12 @@ def _worst(problem: Problem, increment: Increment) -> dict[str, Any]:
     space = model.space
     force = increment.external_force - space.internal_force(stress_of(increment.zones, increment.before, space.npoints))
     kept = constrain(space, stage.supports, stage.bodies).keep_unknown(force)
-    node, component = divmod(int(np.abs(kept).argmax()), len(space.components))
-    on = [name for name, facets in space.mesh.boundaries.items() if (facets == node).any()]
-    return {"at": space.mesh.points[node].tolist(), "component": space.components[component], "boundaries": on}
+    size = np.abs(kept[: len(space.mesh.points) * len(space.components)]).reshape(len(space.mesh.points), -1)
+    nodes = space.mesh.ranks.nearest(-size.max(axis=1))  # one, on the ranks that have it
+    on = [name for name in space.mesh.boundaries if np.isin(nodes, space.mesh.nodes_on(name)).any()]
+    mine = [(space.mesh.points[node].tolist(), int(size[node].argmax()), on) for node in nodes]
+    at, component, on = space.mesh.ranks.one(mine)
+    return {"at": at, "component": space.components[component], "boundaries": on}
 
 
 def _why(found: dict[str, Any], geostatic: bool) -> str:

@@ -81,8 +81,10 @@ class Integration:
     def value(self, increment: Increment) -> float:
         """Return the sum over all increments so far."""
         size = norm(_stress(self.model, increment))
-        whole = float(np.sqrt(self.weights @ size**2))
-        self.total += float(np.sqrt(self.weights @ (increment.local_error * size) ** 2)) / whole if whole else 0.0
+        total = self.model.space.mesh.ranks.sum
+        whole = np.sqrt(total(float(self.weights @ size**2)))
+        error = np.sqrt(total(float(self.weights @ (increment.local_error * size) ** 2)))
+        self.total += float(error / whole) if whole else 0.0
         return self.total
 
     def memory(self) -> float:
@@ -171,6 +173,9 @@ def error_columns(
     said = case.errors
     if said is None:
         return (), None
+    apart = [name for name in said.estimate if name in ("discretisation", "directions")]
+    if apart and model.space.mesh.ranks.size > 1:
+        raise CaseError(f"{case.path.name}: errors.estimate: '{apart[0]}' is estimated where one process has the mesh")
     mesh = Discretisation(model)
     makers: dict[str, Callable[[], tuple[Callable[[Increment], Value], Keeper | None]]] = {
         "equilibrium": lambda: (lambda increment: increment.residuals[-1] + increment.drag, None),

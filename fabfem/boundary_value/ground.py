@@ -85,4 +85,5 @@ def _overburden(case: BoundaryValueCase, mesh: Mesh, height: float) -> float:
 def _heights(mesh: Mesh, zone: str) -> tuple[float, float]:
     """Return the lowest and the highest level of a zone."""
     levels = mesh.points[mesh.cells[mesh.zone(zone)], -1]
-    return float(levels.min()), float(levels.max())
+    low, high = float(levels.min(initial=np.inf)), float(levels.max(initial=-np.inf))
+    return mesh.ranks.least(low), mesh.ranks.largest(high)

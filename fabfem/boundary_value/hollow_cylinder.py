@@ -90,17 +90,16 @@ def _latest(measure: Callable[[Increment], dict[str, float]]) -> Callable[[Incre
 
 def walls_of(said: HollowCylinder, space: Space) -> Walls:
     """Return radii, height and nodes of the walls that a case names; ValueError where they are no walls."""
-    at = {key: np.unique(space.mesh.boundary(getattr(said, key))) for key in ("inner", "outer", "platen")}
-    radii = {key: space.mesh.points[at[key], 0] for key in ("inner", "outer")}
-    for key, values in radii.items():
-        if np.ptp(values) > 1e-9 * values.max():
-            raise ValueError(
-                f"the {key} wall is no cylinder: its radius goes from {values.min():g} to {values.max():g}"
-            )
-    inner, outer = (float(values.mean()) for values in radii.values())
+    at = {key: space.mesh.nodes_on(getattr(said, key)) for key in ("inner", "outer", "platen")}
+    ranks, x = space.mesh.ranks, space.mesh.points
+    for key in ("inner", "outer"):
+        low, high = ranks.least(x[at[key], 0].min(initial=np.inf)), ranks.largest(x[at[key], 0].max(initial=-np.inf))
+        if high - low > 1e-9 * high:
+            raise ValueError(f"the {key} wall is no cylinder: its radius goes from {low:g} to {high:g}")
+    inner, outer = (space.nodal_mean(x[at[key], 0], at[key]) for key in ("inner", "outer"))
     if not inner < outer:
         raise ValueError(f"the inner wall has radius {inner:g}, the outer one {outer:g}")
-    return Walls(inner, outer, float(np.ptp(space.mesh.points[:, 1])), at)
+    return Walls(inner, outer, float(ranks.largest(x[:, 1].max()) - ranks.least(x[:, 1].min())), at)
 
 
 def laboratory_averages(space: Space, walls: Walls, increment: Increment) -> dict[str, float]:
@@ -108,9 +107,13 @@ def laboratory_averages(space: Space, walls: Walls, increment: Increment) -> dic
     r_i, r_o, height, at = walls
     outside, on_soil = (force.reshape(-1, 3) for force in _forces(space, increment))
     radius = space.mesh.points[at["platen"], 0]
-    force, torque = -on_soil[at["platen"], 1].sum(), (on_soil[at["platen"], 2] * radius).sum()
-    p_i = outside[at["inner"], 0].sum() / (2.0 * np.pi * r_i * height)
-    p_o = -outside[at["outer"], 0].sum() / (2.0 * np.pi * r_o * height)
+
+    def summed(values: Array, name: str) -> float:
+        return space.nodal_sum(values, at[name])
+
+    force, torque = -summed(on_soil[at["platen"], 1], "platen"), summed(on_soil[at["platen"], 2] * radius, "platen")
+    p_i = summed(outside[at["inner"], 0], "inner") / (2.0 * np.pi * r_i * height)
+    p_o = -summed(outside[at["outer"], 0], "outer") / (2.0 * np.pi * r_o * height)
     area, cubes = r_o**2 - r_i**2, r_o**3 - r_i**3
     stress = (
         force / (np.pi * area),
@@ -119,10 +122,10 @@ def laboratory_averages(space: Space, walls: Walls, increment: Increment) -> dic
         3.0 * torque / (2.0 * np.pi * cubes),
     )
     moved = increment.displacement[: space.mesh.points.shape[0] * 3].reshape(-1, 3)
-    u_i, u_o = moved[at["inner"], 0].mean(), moved[at["outer"], 0].mean()
-    turn = (moved[at["platen"], 2] * radius).sum() / (radius**2).sum()
+    u_i, u_o = (space.nodal_mean(moved[at[name], 0], at[name]) for name in ("inner", "outer"))
+    turn = summed(moved[at["platen"], 2] * radius, "platen") / summed(radius**2, "platen")
     strain = (
-        -moved[at["platen"], 1].mean() / height,
+        -space.nodal_mean(moved[at["platen"], 1], at["platen"]) / height,
         -(u_o - u_i) / (r_o - r_i),
         -(u_o + u_i) / (r_o + r_i),
         2.0 * turn * cubes / (3.0 * height * area),
@@ -139,7 +142,7 @@ def _forces(space: Space, increment: Increment) -> tuple[Array, Array]:
 def volume_means(space: Space, increment: Increment) -> dict[str, float]:
     """Return the volume means of stress and strain by name; α and b are those of the mean stress."""
     fields = point_fields(space, increment, ("stress", "strain"))
-    means = (np.average(fields[name], axis=0, weights=space.weights) for name in ("stress", "strain"))
+    means = (space.volume_mean(fields[name], space.weights) for name in ("stress", "strain"))
     stress, strain = (to_tensor(mean) for mean in means)
     # compression is positive in the tensors, so that a positive torque has a negative shear stress there
     return _named(

@@ -9,11 +9,14 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
+
 from fabfem.case import BoundaryValueCase
 from fabfem.case.mesh import Box
 from fabfem.fem.box import box_mesh
 from fabfem.fem.elements import ELEMENTS
 from fabfem.fem.mesh import Mesh, MeshError, read_mesh
+from fabfem.identity import hashed
 from umat.cache import user_cache
 
 TIME_LIMIT = 300.0
@@ -48,6 +51,13 @@ def mesh_file(case: BoundaryValueCase) -> Path | None:
 def mesh_place(case: BoundaryValueCase) -> str:
     """Return the place in the case that the mesh comes from."""
     return next(f"mesh.{key}" for key in ("box", "script", "file") if getattr(case.mesh, key) is not None)
+
+
+def hash_of(mesh: Mesh) -> str:
+    """Return a hash of a mesh with its names."""
+    parts = (mesh.zones, mesh.boundaries)
+    named = [part for table in parts for name, ids in table.items() for part in (name.encode(), np.asarray(ids))]
+    return hashed(mesh.points, mesh.cells, mesh.cell_type.encode(), *named)
 
 
 def _box(box: Box, order: int) -> Mesh:

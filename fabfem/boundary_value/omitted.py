@@ -17,7 +17,7 @@ def left_out(
     case: BoundaryValueCase, space: Space, fields: Sequence[str], substances: Mapping[str, Substance]
 ) -> Iterator[str]:
     """Yield a sentence for each thing that a scene does without."""
-    nodes = len(space.mesh.points)
+    nodes = _nodes(space)
     if case.water is None:
         yield f"no pore pressure: the scene is dry ({_corners(space)} unknowns fewer)"
     elif not case.water.excess:
@@ -36,19 +36,32 @@ def left_out(
 
 
 def _corners(space: Space) -> int:
-    return len(np.unique(space.mesh.cells[:, : len(space.mesh.element.corners)]))
+    corners = np.unique(space.mesh.cells[:, : len(space.mesh.element.corners)])
+    return space.mesh.ranks.sum(len(corners[space.mesh.ranks.owned(corners)]))
+
+
+def _nodes(space: Space) -> int:
+    """Return the nodes of the whole mesh."""
+    nodes = np.arange(len(space.mesh.points))
+    return space.mesh.ranks.sum(len(nodes[space.mesh.ranks.owned(nodes)]))
 
 
 def remaining(model: Model) -> Iterator[tuple[str, str]]:
     """Yield (what, how much) of what is left to compute."""
     space = model.space
-    yield "elements", f"{len(space.mesh.cells)} ({space.mesh.cell_type}), {len(space.mesh.points)} nodes"
-    yield "points", str(space.npoints)
-    yield "unknowns", f"{space.ndof}"
+    total = space.mesh.ranks.sum
+    yield "elements", f"{total(len(space.mesh.cells))} ({space.mesh.cell_type}), {_nodes(space)} nodes"
+    yield "points", str(total(space.npoints))
+    yield "unknowns", str(total(len(space.once(np.arange(space.ndof)))))
     for name, zone in model.zones.items():
         if zone.directions is not None:
             yield f"directions in {name}", str(len(zone.directions))
-    yield "memory", f"about {memory(model):.0f} MiB, of which {PROGRAM:.0f} MiB for the program itself"
+    most = f"about {space.mesh.ranks.largest(memory(model)):.0f} MiB{_each(space)}"
+    yield "memory", f"{most}, of which {PROGRAM:.0f} MiB for the program itself"
+
+
+def _each(space: Space) -> str:
+    return "" if space.mesh.ranks.size == 1 else " on the rank that needs most"
 
 
 def memory(model: Model) -> float:

@@ -88,14 +88,17 @@ def _factors(stages: Sequence[Stage]) -> Iterator[Column]:
 
 def _displacement(_: BoundaryValueCase, probe: Probe, space: Space) -> Measure:
     """Return the scaled mean displacement of the nodes of a probe."""
-    dofs = _probed(probe, space) * len(space.components) + space.component(probe.component or "")
-    return lambda increment: float(probe.scale * increment.displacement[dofs].mean())
+    nodes = _probed(probe, space)
+    dofs = nodes * len(space.components) + space.component(probe.component or "")
+    return lambda increment: float(probe.scale * space.nodal_mean(increment.displacement[dofs], nodes))
 
 
 def _pore_pressure(case: BoundaryValueCase, probe: Probe, space: Space) -> Measure:
     """Return the scaled mean pore pressure at the nodes of a probe."""
     nodes = _probed(probe, space)
-    return lambda increment: float(probe.scale * nodal_pore_pressure(case, space, increment)[nodes].mean())
+    return lambda increment: float(
+        probe.scale * space.nodal_mean(nodal_pore_pressure(case, space, increment)[nodes], nodes)
+    )
 
 
 def _mean(_: BoundaryValueCase, probe: Probe, space: Space) -> Measure:
@@ -103,7 +106,7 @@ def _mean(_: BoundaryValueCase, probe: Probe, space: Space) -> Measure:
 
     def measure(increment: Increment) -> float:
         values, weights = _sample(probe, space, increment)
-        return float(probe.scale * np.average(values, weights=weights))
+        return float(probe.scale * space.volume_mean(values, weights))
 
     return measure
 
@@ -113,8 +116,8 @@ def _deviation(_: BoundaryValueCase, probe: Probe, space: Space) -> Measure:
 
     def measure(increment: Increment) -> float:
         values, weights = _sample(probe, space, increment)
-        apart = values - np.average(values, weights=weights)
-        return float(probe.scale * np.sqrt(np.average(apart**2, weights=weights)))
+        apart = values - space.volume_mean(values, weights)
+        return float(probe.scale * np.sqrt(space.volume_mean(apart**2, weights)))
 
     return measure
 
@@ -150,14 +153,14 @@ PROBES: dict[str, tuple[Callable[[BoundaryValueCase, Probe, Space], Measure], st
 def _probed(probe: Probe, space: Space) -> NDArray[np.intp]:
     """Return the nodes of a boundary, or the node nearest to a point."""
     if probe.boundary is not None:
-        return np.unique(np.concatenate([space.mesh.boundary(name).ravel() for name in probe.boundary]))
-    return np.linalg.norm(space.mesh.points - np.asarray(probe.point), axis=1).argmin(keepdims=True)
+        return np.unique(np.concatenate([space.mesh.nodes_on(name) for name in probe.boundary]))
+    return space.mesh.ranks.nearest(np.linalg.norm(space.mesh.points - np.asarray(probe.point), axis=1))
 
 
 def _force(entry: Reaction, space: Space) -> Measure:
     """Return the scaled sum of the support's forces over the nodes of the boundaries, each node once."""
     dofs = _dofs(space, entry.boundary, entry.component)
-    return lambda increment: float(entry.scale * (increment.internal_force - increment.external_force)[dofs].sum())
+    return lambda increment: float(entry.scale * space.total(increment.internal_force - increment.external_force, dofs))
 
 
 def _dofs(space: Space, boundaries: Sequence[str], component: str) -> NDArray[np.intp]:

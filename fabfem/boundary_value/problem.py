@@ -16,7 +16,7 @@ from fabfem.boundary_value.errors import FIELD, Discretisation, error_columns
 from fabfem.boundary_value.fields import known_fields, point_tensors
 from fabfem.boundary_value.ground import ground_stress, zones_of
 from fabfem.boundary_value.hollow_cylinder import hollow_cylinder_columns
-from fabfem.boundary_value.meshes import mesh_of, mesh_place
+from fabfem.boundary_value.meshes import hash_of, mesh_of, mesh_place
 from fabfem.boundary_value.omitted import left_out
 from fabfem.boundary_value.probes import Column, columns
 from fabfem.boundary_value.program import Scene, program
@@ -32,6 +32,7 @@ from fabfem.fem.solve import absent_dofs
 from fabfem.fem.space import Space, build_space
 from fabfem.fem.stages import Stage
 from fabfem.fem.supports import constrain
+from fabfem.parallel.world import communicator, share_cores, shared
 from fabfem.substance import MisfitError, Substance, Surroundings, substance
 
 
@@ -86,8 +87,8 @@ def build(case: BoundaryValueCase) -> Problem:
         found = (*found, *hollow_cylinder_columns(case, space))
     with _blamed(case, "errors"):
         errors, mesh_error = error_columns(case, model, lambda rule: _with_rule(case, space, rule))
-    diagnosed = conditioning_columns(model) if case.solver.diagnose else ()
-    if case.solver.threads:
+    diagnosed = _diagnosed(case, model) if case.solver.diagnose else ()
+    if case.solver.threads and not shared(case):
         umat.set_threads(case.solver.threads)
     omitted = tuple(left_out(case, space, known, substances))
     return Problem(case, model, (*found, *errors, *diagnosed), mesh_error, omitted)
@@ -95,13 +96,28 @@ def build(case: BoundaryValueCase) -> Problem:
 
 def _space(case: BoundaryValueCase) -> Space:
     with _blamed(case, mesh_place(case)):
-        mesh = mesh_of(case)
+        mesh = _mesh(case)
     _check_names(case, mesh)
     kinematics = KINEMATICS[case.scene.kinematics]
     with _blamed(case, "mesh.points" if case.mesh.points else "scene.kinematics"):
         space = build_space(mesh, replace(kinematics, mean_dilation=_mean_dilation(case, mesh)), case.mesh.points)
     with _blamed(case, "water.excess"):
         return porous(space) if case.water is not None and case.water.excess else space
+
+
+def _mesh(case: BoundaryValueCase) -> Mesh:
+    """Return the mesh of a case, or this process's part of it where several share the run."""
+    if not shared(case):
+        return mesh_of(case)
+    with _blamed(case, "solver.linear"):
+        comm = communicator(case)
+    from fabfem.parallel.partition import divided
+    from fabfem.parallel.solver import Settings
+
+    settings = Settings(case.solver.linear == "multigrid", case.solver.petsc)
+    mesh = divided(lambda: mesh_of(case), hash_of, lambda mesh: _mean_dilation(case, mesh), comm, settings)
+    share_cores(comm, case.solver.threads)
+    return mesh
 
 
 def _mean_dilation(case: BoundaryValueCase, mesh: Mesh) -> bool:
@@ -140,6 +156,12 @@ def _zones(case: BoundaryValueCase, name: str, space: Space, filling: Substance)
         with _blamed(case, f"material.{name}"):
             state = umat.initial_state(filling.material, filling.directions, stress, **filling.needs)
         yield zone, Zone(filling.material, filling.directions, state, space.points_of(space.mesh.zone(zone)))
+
+
+def _diagnosed(case: BoundaryValueCase, model: Model) -> tuple[Column, ...]:
+    if model.space.mesh.ranks.size > 1:
+        raise CaseError(f"{case.path.name}: solver.diagnose: the condition is found by one process with the whole mesh")
+    return conditioning_columns(model)
 
 
 def _stages(

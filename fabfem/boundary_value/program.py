@@ -171,8 +171,9 @@ def _acting(scene: Scene, key: tuple[str, ...], course: Course, bodies: Sequence
 
 def _body(space: Space, said: stages.Rigid) -> RigidBody:
     """Return the rigid body on a boundary; ValueError for a bent one that is not rough, or ribs without torsion."""
-    points = space.mesh.points[np.unique(space.mesh.boundary(said.boundary))]
-    low, high = points.min(axis=0), points.max(axis=0)
+    points, ranks = space.mesh.points[space.mesh.nodes_on(said.boundary)], space.mesh.ranks
+    low = ranks.least(points.min(axis=0, initial=np.inf))
+    high = ranks.largest(points.max(axis=0, initial=-np.inf))
     across = int(np.argmin(high - low))
     if said.contact != "rough" and high[across] - low[across] > 1e-9 * (high - low).max():
         raise ValueError(f"a {said.contact} rigid body needs a boundary along an axis, which '{said.boundary}' is not")

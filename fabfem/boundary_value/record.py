@@ -13,17 +13,20 @@ from fabfem.boundary_value.peaks import Peaks
 from fabfem.boundary_value.probes import Column
 from fabfem.boundary_value.problem import Problem
 from fabfem.boundary_value.safety import safety, write_curve
+from fabfem.boundary_value.shares import shares
 from fabfem.boundary_value.stability import localisation
 from fabfem.failures import clear as clear_failures
 from fabfem.failures import keep_points, keep_stage
 from fabfem.fem.increment import Collapsed, Cutback, Increment, Stopped
+from fabfem.fem.share import share_of
+from fabfem.fem.space import Space
 from fabfem.fem.start import Start
 from fabfem.output.checkpoints import PATTERN as CHECKPOINTS
-from fabfem.output.checkpoints import Checkpoint, Checkpoints
-from fabfem.output.history import History
+from fabfem.output.checkpoints import SHARES, Checkpoint, Checkpoints
+from fabfem.output.history import History, Unheard
 from fabfem.output.report import Report
 from fabfem.output.view import write_view
-from fabfem.output.vtu import FieldFiles, Frame
+from fabfem.output.vtu import FieldFiles, FieldPieces, Frame
 from fabfem.timing import Timer
 
 SIGN = "stress and strain are positive in compression"
@@ -69,9 +72,12 @@ class Recorder:
         self.problem, self.folder, self.timer, self.identity = problem, folder, timer, identity
         then = written or Written()
         headers = [column.header for column in problem.columns]
-        self.history = History(folder / "history.csv", headers, then.history)
-        _clear(folder, [name for _, name in then.fields], bool(written))
-        self.report = Report(folder / "report.json", **_head(problem))
+        self._ranks = problem.model.space.mesh.ranks
+        self._first = self._ranks.rank == 0
+        self.history = History(folder / "history.csv", headers, then.history) if self._first else Unheard(headers)
+        if self._first:
+            _clear(folder, [name for _, name in then.fields], bool(written))
+        self.report = Report(folder / "report.json" if self._first else None, **_head(problem))
         self._standing = set(self.report.content) - GATHERED
         self.report.content |= then.report
         self.fields = _field_files(problem, folder, then.fields)
@@ -82,7 +88,8 @@ class Recorder:
         self._last: Increment | None = None
         self._pending = then.pending
         said = problem.case.checkpoint
-        self._checkpoints = Checkpoints(folder, said.seconds, said.increments)
+        wait = lambda: self._ranks.sum(0)  # noqa: E731
+        self._checkpoints = Checkpoints(folder, said.seconds, said.increments, self._ranks.rank, wait)
         recall(problem.columns, then.keepers)
         timer.resume(then.wall_time, then.wall_time.get("total", 0.0))
 
@@ -93,7 +100,8 @@ class Recorder:
             self.row = tuple(column.value(increment) for column in self.problem.columns)
             self.history.write(self.row)
             self._last, self._pending = increment, None
-            keep_points(self.problem.case, self.folder, increment.cutbacks)
+            if self._first:
+                keep_points(self.problem.case, self.folder, increment.cutbacks)
             output = self.problem.case.output
             if output and (increment.number % output.every == 0 or increment.fraction >= 1.0):
                 self._store()
@@ -108,7 +116,7 @@ class Recorder:
                 self.report.content.update(localisation(self.problem.model.space, increment))
         self._write_report()
         with self.timer.phase("output"):
-            if self._checkpoints.due():
+            if self._ranks.largest(self._checkpoints.due()):
                 self._keep()
 
     def failed(self, end: Collapsed) -> None:
@@ -119,7 +127,8 @@ class Recorder:
             self._store()
             self.report.content["factor_of_safety"] = safety(end)
             self.report.content["cutbacks"].extend(map(_refused, end.cutbacks))
-            write_curve(self.folder / "strength_reduction.csv", end, self.problem.case.units.length)
+            if self._first:
+                write_curve(self.folder / "strength_reduction.csv", end, self.problem.case.units.length)
             if self.fields and end.failing and self.problem.case.output:
                 self.fields.write(frame(self.problem, self.problem.case.output, end.failing))
 
@@ -127,7 +136,10 @@ class Recorder:
         """Write what it takes to run again alone what a run could not get through."""
         self.timer.add(end.timings)
         case, resume = self.problem.case, self._last.resume if self._last else self._start
-        keep_points(case, self.folder, end.cutbacks)
+        if self._first:
+            keep_points(case, self.folder, end.cutbacks)
+        if self._ranks.size > 1:  # the state of one rank alone cannot be run again; its checkpoint can
+            return
         keep_stage(case, self.folder, resume, (end.stage, end.fraction, end.reason), mesh_file(case))
 
     def end(self, status: str, reason: str, cutbacks: tuple[Cutback, ...] = ()) -> tuple[str, str]:
@@ -152,7 +164,8 @@ class Recorder:
     def _keep(self) -> None:
         """Write a checkpoint of the last increment."""
         if self._last is not None:
-            moment = Checkpoint(self.identity, self._last.resume, self._written()._asdict())
+            share, number = share_of(self.problem.model.space), self._ranks.size
+            moment = Checkpoint(self.identity, self._last.resume, self._written()._asdict(), share, number)
             self._checkpoints.write(self._last.number, moment)
 
     def _written(self) -> Written:
@@ -175,6 +188,7 @@ class Recorder:
 
     def _write_report(self) -> None:
         total = self.timer.total()
+        self.report.content |= shares(self.problem.model.space, self.timer)
         self.report.write({**self.timer.spent, "other": total - sum(self.timer.spent.values()), "total": total})
 
 
@@ -219,10 +233,15 @@ def _place(problem: Problem, increment: Increment) -> dict[str, Any]:
     return {
         "point": increment.worst_point,
         "error": increment.worst_error,
-        "at": problem.model.space.points[increment.worst_point].tolist(),
+        "at": place_of(problem.model.space, increment.worst_point),
         "stage": increment.stage,
         "increment": increment.number,
     }
+
+
+def place_of(space: Space, point: int) -> list[float]:
+    """Return where a point of the whole mesh is."""
+    return space.mesh.ranks.places(space.points, [point], space.nq)[0].tolist()
 
 
 def _field_files(problem: Problem, folder: Path, stored: Sequence[tuple[float, str]]) -> FieldFiles | None:
@@ -230,17 +249,25 @@ def _field_files(problem: Problem, folder: Path, stored: Sequence[tuple[float, s
         return None
     mesh = problem.model.space.mesh
     units = problem.case.unit_system
-    write_view(folder, problem.case.path.stem, problem.case.output.fields)
+    if mesh.ranks.rank == 0:
+        write_view(folder, problem.case.path.stem, problem.case.output.fields)
     note = f"fabfem: {SIGN}; length in {units.length}, stress in {units.label('stress')}"
-    return FieldFiles(folder, mesh.points, mesh.cells, mesh.cell_type, note, stored)
+    parts = (folder, mesh.points, mesh.cells, mesh.cell_type, note, stored)
+    ranks = mesh.ranks
+    return FieldFiles(*parts) if ranks.size == 1 else FieldPieces(ranks.rank, ranks.size, *parts)
 
 
 def _clear(folder: Path, kept: Sequence[str], resumed: bool) -> None:
     """Remove the results and pictures of an earlier run, or what it has that is later than its checkpoint."""
     if not resumed:
         clear_failures(folder)
-    later = ("fields_*.vtu", "strength_reduction.csv", "*.png", ".*.part")
-    for pattern in later if resumed else (*later, "fields.pvd", "report.json", CHECKPOINTS):
+    later = ("fields_*.vtu", "fields_*.pvtu", "strength_reduction.csv", "*.png", ".*.part")
+    for pattern in later if resumed else (*later, "fields.pvd", "report.json", CHECKPOINTS, SHARES):
         for file in folder.glob(pattern):
-            if file.name not in kept:
+            if not _belongs(file.name, kept):
                 file.unlink()
+
+
+def _belongs(name: str, kept: Sequence[str]) -> bool:
+    """Return whether a file is one of those kept, or a rank's piece of one."""
+    return name in kept or f"{name[: len('fields_0000')]}.pvtu" in kept

@@ -2,25 +2,26 @@
 
 import json
 from collections.abc import Iterator
+from contextlib import nullcontext
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from fabfem.boundary_value.audit import audited
+from fabfem.boundary_value.meshes import hash_of
 from fabfem.boundary_value.omitted import memory, remaining
 from fabfem.boundary_value.price import price as price_of
 from fabfem.boundary_value.price import remember as remember_run
 from fabfem.boundary_value.problem import Problem, build
-from fabfem.boundary_value.record import PHASES, Recorder, Written, recall
+from fabfem.boundary_value.record import PHASES, Recorder, Written, place_of, recall
 from fabfem.boundary_value.safety import sentence
+from fabfem.boundary_value.shares import blame, dealt
 from fabfem.case import BoundaryValueCase, CaseError
 from fabfem.fem.flow import UNDECIDED
 from fabfem.fem.increment import Collapsed, Increment, Stopped
-from fabfem.fem.mesh import Mesh
+from fabfem.fem.share import share_of
 from fabfem.fem.solve import march
 from fabfem.fem.start import misfit
-from fabfem.identity import hashed, identity
+from fabfem.identity import identity
 from fabfem.outcome import INTERRUPTED, Description, Outcome, claimed, short, unwritten
 from fabfem.output.checkpoints import Checkpoint
 from fabfem.output.interrupt import held_back, patient
@@ -66,15 +67,21 @@ def run(
     timer = timer or Timer(PHASES)
     with timer.phase("mesh"):
         problem = build(case)
-        known = identity(case, mesh=_hashed(problem.model.space.mesh))
+        known = identity(case, mesh=problem.model.space.mesh.ranks.told() or hash_of(problem.model.space.mesh))
         begun = checkpoint_of(restart, folder, known)
+        if begun:
+            begun = dealt(begun, restart.branch or folder, share_of(problem.model.space))
         steps = _steps(problem, begun, restart)
-    with claimed(folder):
+    ranks = problem.model.space.mesh.ranks
+    with claimed(folder) if ranks.rank == 0 else nullcontext():
+        ranks.sum(0)  # none writes before the folder is there
         try:
             recorder = _recorder(problem, folder, timer, known, begun, restart)
-            with Quiet() if quiet else Terminal(len(problem.model.stages)) as shown:
+            with Quiet() if quiet or ranks.rank else Terminal(len(problem.model.stages)) as shown:
                 status, reason = _drive(steps, recorder, shown)
         except OSError as error:
+            if ranks.size > 1:  # the others wait for this rank, and do not know
+                raise
             return unwritten(error, folder, timer.total())
     headers = [column.header for column in problem.columns]
     last = tuple((header, short(value)) for header, value in zip(headers, recorder.row, strict=False))
@@ -122,16 +129,9 @@ def _recorder(
     return recorder
 
 
-def _hashed(mesh: Mesh) -> str:
-    """Return a hash of a mesh with its names."""
-    parts = (mesh.zones, mesh.boundaries)
-    named = [part for table in parts for name, ids in table.items() for part in (name.encode(), np.asarray(ids))]
-    return hashed(mesh.points, mesh.cells, mesh.cell_type.encode(), *named)
-
-
 def _drive(steps: Iterator[Increment | Stopped | Collapsed], recorder: Recorder, shown: Quiet) -> tuple[str, str]:
     """March to the end and return the status and the reason."""
-    case = recorder.problem.case
+    case, ranks = recorder.problem.case, recorder.problem.model.space.mesh.ranks
     try:
         with patient(shown.say) as interrupted:
             for step in steps:
@@ -145,10 +145,15 @@ def _drive(steps: Iterator[Increment | Stopped | Collapsed], recorder: Recorder,
                 if audited(recorder.problem, step):
                     shown.say(_audit(recorder.report.content["audit"], case.units.length))
                 shown.advance(step.stage, step.stage_index + step.fraction, step.number, step.iterations)
-                if interrupted():
+                if ranks.largest(interrupted()):
                     return recorder.end("interrupted", INTERRUPTED)
-    except KeyboardInterrupt:
-        return recorder.end("interrupted", INTERRUPTED)
+    except (KeyboardInterrupt, Exception) as error:
+        if ranks.size > 1:
+            blame(recorder.folder, ranks.rank, error)
+            raise
+        if isinstance(error, KeyboardInterrupt):
+            return recorder.end("interrupted", INTERRUPTED)
+        raise
     return recorder.end("completed", "")
 
 
@@ -178,5 +183,5 @@ def _why(stopped: Stopped, problem: Problem) -> str:
 
 
 def _coordinates(problem: Problem, point: int) -> str:
-    places = ", ".join(f"{value:.4g}" for value in problem.model.space.points[point])
+    places = ", ".join(f"{value:.4g}" for value in place_of(problem.model.space, point))
     return f"point {point} ({places})"

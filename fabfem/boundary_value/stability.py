@@ -50,14 +50,16 @@ def acoustic_determinant(space: Space, increment: Increment) -> Array:
 def localisation(space: Space, increment: Increment) -> dict[str, Any]:
     """Return the report's entry on the first increment after which a band may form, empty as long as none may."""
     least = acoustic_determinant(space, increment)
-    lost = np.flatnonzero(least <= LOST)
-    if not len(lost):
+    ranks = space.mesh.ranks
+    lost = ranks.sum(int((least <= LOST).sum()))
+    if not lost:
         return {}
-    worst = int(np.argmin(least))
+    lowest = ranks.least(float(least.min()))
+    mine = space.points[least == lowest][:1].tolist()
     return {
         "localisation": {
-            **{"stage": increment.stage, "increment": increment.number, "points": len(lost)},
-            **{"at": space.points[worst].tolist(), "determinant": float(least[worst])},
+            **{"stage": increment.stage, "increment": increment.number, "points": lost},
+            **{"at": ranks.one(mine), "determinant": lowest},
             "meaning": "from here on a band may form, as wide as an element: what follows depends on the mesh",
         }
     }

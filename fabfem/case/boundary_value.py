@@ -31,8 +31,11 @@ class Solver(Table):
     """Stress that resists the rate of strain, over the elastic stress of the same strain in one stage."""
     held: Annotated[float, Field(ge=0, le=1)] = 0.0
     """Share of the points that may keep their stress in an increment where the material refuses them."""
-    linear: Literal["auto", "superlu", "pardiso", "multigrid"] = "auto"
-    """Linear solver; auto takes multigrid for large solids, else PARDISO where it is installed."""
+    linear: Literal["auto", "superlu", "pardiso", "mumps", "multigrid"] = "auto"
+    """Linear solver; auto takes multigrid for large solids, else PARDISO where it is installed, and MUMPS where several
+    processes share the run."""
+    petsc: dict[str, str | int | float | bool] = Field(default_factory=dict)
+    """Options of PETSc, without the leading dash, where it solves: mumps, several processes, multigrid with options."""
     threads: Annotated[int, Field(ge=0)] = 0
     """Threads for the material points; 0 takes the cores there are."""
     diagnose: bool = False

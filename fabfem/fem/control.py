@@ -5,7 +5,6 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from fabfem.fem.linear import norm
 from fabfem.fem.space import Space
 from fabfem.fem.stages import ArcLength, DisplacementControl
 
@@ -36,6 +35,7 @@ def control(goal: object, space: Space) -> Control:
 
 
 class _Displacement(NamedTuple):
+    space: Space
     direction: np.ndarray
     change: float
 
@@ -43,17 +43,18 @@ class _Displacement(NamedTuple):
         return self.direction
 
     def misfit(self, step: np.ndarray, size: float) -> float:
-        return size * self.change - float((self.direction * step).sum())
+        return size * self.change - self.space.dot(self.direction, step)
 
     def scale(self, size: float) -> float:
         return abs(size * self.change)
 
     def first(self, along: np.ndarray, size: float, last: np.ndarray | None, sense: float) -> float:
-        slope = float((self.direction * along).sum())
+        slope = self.space.dot(self.direction, along)
         return size * self.change / slope if slope else np.inf
 
 
 class _Arc(NamedTuple):
+    space: Space
     nodes: int
     length: float
 
@@ -61,14 +62,14 @@ class _Arc(NamedTuple):
         return 2.0 * step / self.nodes
 
     def misfit(self, step: np.ndarray, size: float) -> float:
-        return (size * self.length) ** 2 - float((step * step).sum()) / self.nodes
+        return (size * self.length) ** 2 - self.space.dot(step, step) / self.nodes
 
     def scale(self, size: float) -> float:
         return (size * self.length) ** 2
 
     def first(self, along: np.ndarray, size: float, last: np.ndarray | None, sense: float) -> float:
-        length = norm(along) / np.sqrt(self.nodes)
-        forward = sense or (1.0 if last is None or (last * along).sum() >= 0.0 else -1.0)
+        length = self.space.norm(along) / np.sqrt(self.nodes)
+        forward = sense or (1.0 if last is None or self.space.dot(last, along) >= 0.0 else -1.0)
         return forward * size * self.length / length if length else np.inf
 
 
@@ -77,10 +78,11 @@ def _(goal: DisplacementControl, space: Space) -> Control:
     direction = np.zeros(space.ndof)
     for boundary, component, factor in goal.terms:
         dofs = space.dofs_on(boundary, component)
-        direction[dofs] += factor / len(dofs)
-    return _Displacement(direction, goal.change)
+        direction[dofs] += factor / space.mesh.ranks.sum(len(space.once(dofs)))
+    return _Displacement(space, direction, goal.change)
 
 
 @control.register
 def _(goal: ArcLength, space: Space) -> Control:
-    return _Arc(len(space.mesh.points), goal.length)
+    nodes = np.arange(len(space.mesh.points))
+    return _Arc(space, space.mesh.ranks.sum(len(nodes[space.mesh.ranks.owned(nodes)])), goal.length)

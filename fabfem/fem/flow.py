@@ -15,7 +15,6 @@ from typing import NamedTuple
 import numpy as np
 
 from fabfem.fem.increment import advanced, largest
-from fabfem.fem.linear import norm
 from fabfem.fem.model import Refusal, elastic_tangents
 from fabfem.fem.newton import solve_increment, solved, stiffness_of
 from fabfem.fem.trial import Equilibrium, System, Task, Trial, relative
@@ -61,7 +60,7 @@ def flow(system: System, now: Equilibrium, load: np.ndarray, enough: float) -> F
             continue
         old, now = now, advanced(now, trial)
         drag, moved = (
-            relative(norm(trial.drag), trial.force, load),
+            relative(system, system.space.norm(trial.drag), trial.force, load),
             largest(system, now.displacement - start.displacement),
         )
         reached = Flow(UNDECIDED, "", old, now, trial, drag, moved, iterations)

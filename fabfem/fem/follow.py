@@ -24,7 +24,6 @@ import numpy as np
 
 from fabfem.fem.control import Control, control
 from fabfem.fem.increment import Cutback, Increment, Place, Step, Stopped, advanced, increment
-from fabfem.fem.linear import norm
 from fabfem.fem.loads import Loading
 from fabfem.fem.model import Refusal, elastic_tangents
 from fabfem.fem.newton import Solved, stiffness_of, worst_point
@@ -145,13 +144,14 @@ def _iterated(
             break
         trial, factor = _corrected(system, load, equation, reached, size, trial, factor)
         iterations += 1
-    if isinstance(trial, Trial) and reached.last is not None and _cosine(trial.step, reached.last) < BACK:
+    if isinstance(trial, Trial) and reached.last is not None and _cosine(system, trial.step, reached.last) < BACK:
         trial = Refusal("the path runs back along the last increment")
     return Solved(trial, iterations, tuple(residuals)), factor
 
 
-def _cosine(step: np.ndarray, last: np.ndarray) -> float:
-    return float((step * last).sum()) / max(norm(step) * norm(last), 1e-300)
+def _cosine(system: System, step: np.ndarray, last: np.ndarray) -> float:
+    space = system.space
+    return space.dot(step, last) / max(space.norm(step) * space.norm(last), 1e-300)
 
 
 def _predicted(
@@ -192,17 +192,20 @@ def _corrected(
         return both, factor
     at_rest, along = both
     row = equation.row(trial.step)
-    slope = float((row * along).sum())
+    slope = system.space.dot(row, along)
     if not slope:
         return Refusal("the load does not move what is controlled"), factor
-    change = (equation.misfit(trial.step, size) - float((row * at_rest).sum())) / slope
+    change = (equation.misfit(trial.step, size) - system.space.dot(row, at_rest)) / slope
     share = 1.0
     new: Trial | Refusal = Refusal("")
     for _ in range(system.controls.backtracks + 1):
         at = factor + share * change
         task = _task(system, load, at, reached.now, size)
         new = attempt(system, reached.now, task, trial.step + share * (at_rest + change * along))
-        if isinstance(new, Trial) and new.norm < system.controls.rise * trial.norm + norm(trial.force) * 1e-3:
+        if (
+            isinstance(new, Trial)
+            and new.norm < system.controls.rise * trial.norm + system.space.norm(trial.force) * 1e-3
+        ):
             return new, at
         share *= 0.5
     return new, factor
@@ -224,7 +227,7 @@ def _both(
 ) -> tuple[np.ndarray, np.ndarray] | Refusal:
     constraints = system.constraints
     whole = stiffness_of(system, Task(load.total(0.0), constraints.motion, None), tangent)
-    pushed = constraints.collect(load.total(1.0) - load.total(0.0) - whole @ constraints.motion)
+    pushed = constraints.collect(load.total(1.0) - load.total(0.0) - system.space.summed(whole @ constraints.motion))
     with system.timer.phase("linear_solve"):
         system.solver.factor(system.reduce(whole))
         answers = [system.solver.solve(rhs) for rhs in (unbalanced, pushed)]

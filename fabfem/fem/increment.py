@@ -6,12 +6,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from fabfem.fem.linear import norm
 from fabfem.fem.model import Refused, States, Zone
 from fabfem.fem.newton import Solved
 from fabfem.fem.stages import Stage
 from fabfem.fem.start import Start
-from fabfem.fem.trial import Equilibrium, System, Trial, begun, mechanical, relative
+from fabfem.fem.trial import Equilibrium, System, Trial, begun, relative, work
 
 
 @dataclass(frozen=True)
@@ -186,7 +185,8 @@ def advanced(old: Equilibrium, trial: Trial) -> Equilibrium:
 
 def largest(system: System, displacement: np.ndarray) -> float:
     """Length of the largest displacement of a node."""
-    return float(np.linalg.norm(system.space.displacement(displacement), axis=1).max())
+    there = np.linalg.norm(system.space.displacement(displacement), axis=1)
+    return system.space.mesh.ranks.largest(float(there.max()))
 
 
 def increment(
@@ -204,7 +204,8 @@ def increment(
 ) -> Increment:
     """The record of an increment from `old` to `now`, after which the course has come to `progress`."""
     force = begun(system, old, step.size)
-    start = norm(mechanical(system, system.constraints.collect(step.load - force)))
+    unbalanced = system.constraints.collect(step.load - force)
+    start = float(np.sqrt(work(system, unbalanced, unbalanced)))
     return Increment(
         stage=place.stage.name,
         stage_index=place.stage_index,
@@ -218,8 +219,8 @@ def increment(
         external_force=step.on_soil,
         iterations=step.solved.iterations,
         residuals=step.solved.residuals,
-        out_of_balance=relative(start, mechanical(system, force), step.load),
-        drag=relative(norm(trial.drag), trial.force, step.load),
+        out_of_balance=relative(system, start, force, step.load),
+        drag=relative(system, system.space.norm(trial.drag), trial.force, step.load),
         held=trial.batch.held,
         moved=largest(system, trial.step),
         cutbacks=step.cutbacks,

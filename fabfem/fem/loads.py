@@ -146,11 +146,13 @@ def _(load: BodyForce, space: Space) -> np.ndarray:
         if name not in names:
             raise ValueError(f"a rigid body takes no force along '{name}' here; it has {', '.join(names)}.")
     resultant = np.array([load.force.get(name, 0.0) for name in names])
-    share = modes @ np.linalg.lstsq(modes.T @ modes, resultant, rcond=1e-12)[0]
-    if np.abs(modes.T @ share - resultant).max() > 1e-9 * np.abs(resultant).max(initial=0.0):
+    own = np.isin(dofs, space.once(dofs))[:, None] * modes
+    gram = space.mesh.ranks.sum(own.T @ own)
+    factors = np.linalg.lstsq(gram, resultant, rcond=1e-12)[0]
+    if np.abs(gram @ factors - resultant).max() > 1e-9 * np.abs(resultant).max(initial=0.0):
         raise ValueError(f"a smooth body on boundary '{load.body.boundary}' cannot hand on a force along it.")
     force = np.zeros(space.ndof)
-    force[dofs] = share
+    force[dofs] = modes @ factors
     return force
 
 
@@ -172,7 +174,7 @@ def k0_stress(
     up = space.mesh.dim - 1
     depth, wet = level - space.points[points, up], np.maximum(min(table, level) - space.points[points, up], 0.0)
     vertical = unit_weight * (depth - wet) + buoyant_weight * wet + surcharge
-    if vertical.min() <= 0.0:
+    if vertical.min(initial=np.inf) <= 0.0:
         height = space.points[points, up][vertical.argmin()]
         raise ValueError(f"the K0 stress is {vertical.min():g} at height {height:g}, above the surface {level:g}.")
     stress = np.zeros((len(vertical), 6))
@@ -212,4 +214,4 @@ def _gather(space: Space, cells: np.ndarray, shares: np.ndarray) -> np.ndarray:
     """(ndof,) sum of shares (n, nnode, ncomp) at the nodes of `cells`."""
     ncomp = len(space.components)
     dofs = cells[:, :, None] * ncomp + np.arange(ncomp)
-    return np.bincount(dofs.ravel(), shares.ravel(), space.ndof)
+    return space.summed(np.bincount(dofs.ravel(), shares.ravel(), space.ndof))

@@ -16,6 +16,7 @@ import numpy as np
 from meshio.abaqus._abaqus import abaqus_to_meshio_type
 
 from fabfem.fem.elements import ELEMENTS, ElementType, quadrature, shape
+from fabfem.fem.ranks import ALONE, Alone
 
 
 class MeshError(ValueError):
@@ -38,6 +39,8 @@ class Mesh:
         Name -> element numbers.
     boundaries : dict
         Name -> (nfacet, nfacetnode) nodes, turned so that the right-hand normal points out of the element.
+    ranks : Alone
+        Who has the other parts of the mesh, where this is one of several.
     """
 
     points: np.ndarray
@@ -45,6 +48,7 @@ class Mesh:
     cell_type: str
     zones: dict[str, np.ndarray]
     boundaries: dict[str, np.ndarray]
+    ranks: Alone = ALONE
 
     @property
     def dim(self) -> int:
@@ -63,6 +67,10 @@ class Mesh:
     def boundary(self, name: str) -> np.ndarray:
         """(nfacet, nfacetnode) nodes of a boundary; raises MeshError with the names that exist."""
         return _named(self.boundaries, name, "boundary")
+
+    def nodes_on(self, name: str) -> np.ndarray:
+        """The nodes of a boundary, each once; also those whose facets are all on other ranks."""
+        return np.unique(np.concatenate([self.boundary(name).ravel(), self.ranks.touching(name)]))
 
 
 def read_mesh(path: str | Path, order: int | None = None) -> Mesh:
@@ -138,6 +146,15 @@ def inner_facets(cells: np.ndarray, cell_type: str) -> tuple[np.ndarray, np.ndar
     twin = np.flatnonzero((corners[order[1:]] == corners[order[:-1]]).all(axis=1))
     elements = np.stack([order[twin], order[twin + 1]], axis=1) // len(element.facets)
     return np.sort(elements, axis=1), facets[order[twin]]
+
+
+def owners(mesh: Mesh, facets: np.ndarray) -> np.ndarray:
+    """(n,) an element that each of some facets (n, nfacetnode) of a mesh belongs to."""
+    width = _ncorner(mesh.element)
+    every = np.sort(_facets(mesh.cells, mesh.element)[:, :width], axis=1)
+    keys = np.vstack([every, np.sort(facets[:, :width], axis=1)])
+    _, first, key = np.unique(keys, axis=0, return_index=True, return_inverse=True)
+    return first[key.ravel()[len(every) :]] // len(mesh.element.facets)
 
 
 def _read(path: Path) -> meshio.Mesh:

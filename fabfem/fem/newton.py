@@ -15,9 +15,8 @@ from scipy.sparse import csr_matrix
 
 from fabfem.fem.assembly import stiffness
 from fabfem.fem.diagnosis import singularity
-from fabfem.fem.linear import norm
 from fabfem.fem.model import Controls, Refusal, elastic_tangents
-from fabfem.fem.trial import Equilibrium, System, Task, Trial, attempt, make_task, mechanical
+from fabfem.fem.trial import Equilibrium, System, Task, Trial, attempt, make_task, work
 
 MARGIN = 0.1
 """What a correction with old factors must promise to leave, over the tolerance."""
@@ -84,7 +83,7 @@ def _again(system: System, old: Equilibrium, task: Task, trial: Trial) -> Trial 
 
 def round_off(system: System, step: np.ndarray) -> float:
     """The out-of-balance force that round-off alone makes; it matters where a body moves without strain."""
-    return 1e-14 * system.stiffest * norm(step)
+    return 1e-14 * system.stiffest * system.space.norm(step)
 
 
 def _predicted(system: System, old: Equilibrium, task: Task) -> Trial | Refusal:
@@ -122,7 +121,7 @@ def _extended(system: System, old: Equilibrium, task: Task, tangent: np.ndarray)
     """The trial of one linear step from `old` to the new load and held dofs."""
     matrix = stiffness_of(system, task, tangent)
     start = old.force if task.start is None else task.start
-    rhs = system.constraints.collect(task.load - start - matrix @ task.motion)
+    rhs = system.constraints.collect(task.load - start - system.space.summed(matrix @ task.motion))
     correction = solved(system, matrix, rhs)
     if isinstance(correction, Refusal):
         return correction
@@ -138,21 +137,17 @@ def _searched(system: System, old: Equilibrium, task: Task, trial: Trial, tangen
     if isinstance(correction, Refusal):
         return correction
     along = system.constraints.spread(correction)
-    start = _work(system, correction, trial.unbalanced)
+    start = work(system, correction, trial.unbalanced)
     tried: list[Trial | Refusal] = []
     factor = 1.0
     for _ in range(system.controls.backtracks + 1):
         new = attempt(system, old, task, trial.step + factor * along)
         tried.append(new)
-        left = _work(system, correction, new.unbalanced) if isinstance(new, Trial) else 0.0
+        left = work(system, correction, new.unbalanced) if isinstance(new, Trial) else 0.0
         if isinstance(new, Trial) and _content(system.controls, new.norm / trial.norm, start, left):
             return new
         factor *= float(np.clip(start / (start - left), 0.1, 0.5)) if left < 0.0 < start else 0.5
     return _least(system, trial, tried)
-
-
-def _work(system: System, correction: np.ndarray, unbalanced: np.ndarray) -> float:
-    return float((mechanical(system, correction) * mechanical(system, unbalanced)).sum())
 
 
 def _content(controls: Controls, rise: float, start: float, left: float) -> bool:
@@ -184,7 +179,8 @@ def stiffness_of(system: System, task: Task, tangent: np.ndarray) -> csr_matrix:
 
 def solved(system: System, matrix: csr_matrix, rhs: np.ndarray) -> np.ndarray | Refusal:
     """The unknowns that a force on them moves, under a stiffness (ndof, ndof), or why not."""
-    if not len(rhs):  # everything is held
+    ranks = system.space.mesh.ranks
+    if not ranks.largest(len(rhs)):  # everything is held
         return rhs
     with system.timer.phase("linear_solve"):
         reduced = system.reduce(matrix)
@@ -193,13 +189,16 @@ def solved(system: System, matrix: csr_matrix, rhs: np.ndarray) -> np.ndarray | 
         solution = system.solver.solve(rhs)
         if solution.ok:
             return solution.x
-        named = singularity(system, reduced)
+        named = singularity(system, reduced) if ranks.size == 1 else ""
     return Refusal(named or solution.reason)
 
 
 def worst_point(system: System, trial: Trial) -> int:
     """A point of an element at the most unbalanced dof."""
-    if not len(trial.unbalanced):
+    space, ranks = system.space, system.space.mesh.ranks
+    size = np.abs(system.constraints.spread(trial.unbalanced))
+    largest, nobody = ranks.largest(float(size.max())), np.iinfo(np.int64).max
+    if largest == 0.0:
         return -1
-    dof = np.abs(system.constraints.spread(trial.unbalanced)).argmax()
-    return int(np.argmax((system.space.dofs == dof).any(axis=1))) * system.space.nq
+    number = int(np.argmax((space.dofs == size.argmax()).any(axis=1))) * space.nq
+    return ranks.least(ranks.point(number, space.nq) if size.max() == largest else nobody)

@@ -22,6 +22,8 @@ Pairs = tuple[np.ndarray, np.ndarray]
 
 def patches(mesh: Mesh) -> np.ndarray:
     """(nel,) number of the patch that each element belongs to."""
+    if mesh.ranks.patches is not None:
+        return mesh.ranks.patches
     label = np.arange(len(mesh.cells))
     if len(mesh.element.nodes) > mesh.dim + 1:
         return label

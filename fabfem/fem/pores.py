@@ -21,7 +21,6 @@ from scipy.sparse import csr_matrix
 
 from fabfem.fem.assembly import Pattern
 from fabfem.fem.elements import ELEMENTS, shape
-from fabfem.fem.linear import norm
 from fabfem.fem.space import Space
 
 PORE_PRESSURE = "pore_pressure"
@@ -59,8 +58,25 @@ class PorousSpace(Space):
         """Dofs of one component on a boundary, each once."""
         if component != PORE_PRESSURE:
             return super().dofs_on(boundary, component)
-        here = np.isin(self.pressure_nodes, self.mesh.boundary(boundary))
+        here = np.isin(self.pressure_nodes, self.mesh.nodes_on(boundary))
         return self.nmotion + np.flatnonzero(here)
+
+    def summed(self, force: np.ndarray) -> np.ndarray:
+        """(ndof,) nodal forces and volumes with what the elements of other ranks add to them."""
+        if self.mesh.ranks.size == 1:
+            return force
+        volumes = np.zeros((len(self.mesh.points), 1))
+        volumes[self.pressure_nodes, 0] = force[self.nmotion :]
+        whole = self.mesh.ranks.summed(volumes)[self.pressure_nodes, 0]
+        return np.concatenate([super().summed(force[: self.nmotion]), whole])
+
+    @cached_property
+    def counted(self) -> np.ndarray | slice:
+        """Which dofs this rank counts: all, or those of the nodes that it owns."""
+        motion, owned = super().counted, self.mesh.ranks.owned(self.pressure_nodes)
+        if isinstance(motion, slice) or isinstance(owned, slice):
+            return slice(None)
+        return np.concatenate([motion, owned])
 
     def displacement(self, u: np.ndarray) -> np.ndarray:
         """(nnodes, 3) displacement along the three axes of the kinematics."""
@@ -137,6 +153,7 @@ class Water(NamedTuple):
     duration: float
     """Time that the stage takes."""
     nmotion: int
+    space: PorousSpace
 
     def matrix(self, size: float) -> csr_matrix:
         """What is added to the stiffness in an increment of a part `size` of the stage."""
@@ -147,7 +164,7 @@ class Water(NamedTuple):
         return matrix
 
     def start(self, unknowns: np.ndarray, size: float) -> np.ndarray:
-        """(ndof,) what the pressures at the start of an increment contribute to its forces and volumes."""
+        """(ndof,) what pressures at the start of an increment add to its forces and volumes, in a rank's elements."""
         pressure = unknowns.copy()
         pressure[: self.nmotion] = 0.0
         force = self.coupling @ pressure
@@ -156,16 +173,18 @@ class Water(NamedTuple):
 
     def misfit(self, step: np.ndarray, volumes: np.ndarray, unknown: np.ndarray) -> float:
         """The norm of the volumes (ndof,) left over at dofs `unknown`, over that of all volumes that go to and fro."""
-        left = norm(volumes[unknown[unknown >= self.nmotion]])
-        moved = norm((abs(self.coupling) @ np.abs(step))[self.nmotion :])
-        return left / moved if moved > 0.0 else 0.0
+        kept, moved = np.zeros(len(volumes)), self.space.summed(abs(self.coupling) @ np.abs(step))
+        pressures = unknown[unknown >= self.nmotion]
+        kept[pressures], moved[: self.nmotion] = volumes[pressures], 0.0
+        size = self.space.norm(moved)
+        return self.space.norm(kept) / size if size > 0.0 else 0.0
 
 
 def water_of(space: PorousSpace, pattern: Pattern, water: PoreWater, flows: bool, duration: float) -> Water:
     """The water in a stage that lasts `duration`; `flows` tells whether it may move through the pores."""
     coupling = _assembled(space, pattern, _coupling(space, water.storage))
     seepage = _assembled(space, pattern, _seepage(space, water.mobility)) if flows else None
-    return Water(coupling, seepage, duration, space.nmotion)
+    return Water(coupling, seepage, duration, space.nmotion, space)
 
 
 class Flowed(NamedTuple):
@@ -192,8 +211,8 @@ class Pace:
         if self._water is None or past.rate is None:
             return 0.0
         pressures = slice(self._water.nmotion, None)
-        largest = max(past.largest, float(np.abs(start[pressures]).max()))
-        change = np.abs(step[pressures] / size - past.rate).max()
+        largest = max(past.largest, self._most(start[pressures]))
+        change = self._most(step[pressures] / size - past.rate)
         return float(0.5 * size * change / (largest * self._tolerance)) if largest > 0.0 else 0.0
 
     def after(self, past: Flowed, start: np.ndarray, step: np.ndarray, size: float) -> Flowed:
@@ -201,7 +220,11 @@ class Pace:
         if self._water is None:
             return past
         pressures = slice(self._water.nmotion, None)
-        return Flowed(step[pressures] / size, max(past.largest, float(np.abs(start[pressures]).max())))
+        return Flowed(step[pressures] / size, max(past.largest, self._most(start[pressures])))
+
+    def _most(self, pressures: np.ndarray) -> float:
+        assert self._water is not None
+        return self._water.space.mesh.ranks.largest(float(np.abs(pressures).max(initial=0.0)))
 
 
 def _assembled(space: PorousSpace, pattern: Pattern, local: np.ndarray) -> csr_matrix:

@@ -41,7 +41,7 @@ def _kept(data, keep, count):
 
 def reduction(pattern: Pattern, constraints: Constraints) -> Reduction:
     """How to reduce matrices of `pattern`."""
-    return _combined(pattern, constraints) if len(constraints.tied) else _cut(pattern, constraints)
+    return _combined(pattern, constraints) if constraints.ties.shape[1] else _cut(pattern, constraints)
 
 
 def _cut(pattern: Pattern, constraints: Constraints) -> Reduction:

@@ -35,7 +35,7 @@ from fabfem.fem.space import Space
 from fabfem.fem.stages import ArcLength, DisplacementControl, Stage, StrengthSearch
 from fabfem.fem.start import Start, misfit
 from fabfem.fem.supports import Constraints, constrain
-from fabfem.fem.trial import PHASES, Equilibrium, System, Trial
+from fabfem.fem.trial import PHASES, Equilibrium, System, Trial, balanced
 from fabfem.timing import Timer
 
 __all__ = ["Collapsed", "Cutback", "Factor", "Increment", "Start", "Stopped", "march", "reaction", "systems_of"]
@@ -81,7 +81,8 @@ def systems_of(model: Model) -> list[System]:
     space = model.space
     pattern = find_pattern(space.dofs, space.ndof)
     elastic = stiffness(space, pattern, elastic_tangents(model.zones, model.states, space.npoints))
-    shared = (pattern, Timer(PHASES), float(np.abs(elastic.diagonal()).max()))
+    stiffest = space.mesh.ranks.largest(float(np.abs(space.summed(elastic.diagonal())).max()))
+    shared = (pattern, Timer(PHASES), stiffest)
     zones: Mapping[str, Zone] = model.zones
     systems: list[System] = []
     for stage in model.stages:
@@ -92,8 +93,7 @@ def systems_of(model: Model) -> list[System]:
 
 def reaction(space: Space, increment: Increment, boundary: str, component: str) -> float:
     """Force that the supports of a boundary exert on the body along a component."""
-    dofs = space.dofs_on(boundary, component)
-    return float((increment.internal_force - increment.external_force)[dofs].sum())
+    return space.total(increment.internal_force - increment.external_force, space.dofs_on(boundary, component))
 
 
 def changed(zones: Mapping[str, Zone], stage: Stage) -> dict[str, Zone]:
@@ -115,7 +115,7 @@ def absent_dofs(space: Space, absent: Mapping[str, Zone]) -> np.ndarray:
         there[zone.points] = False
     kept = np.zeros(space.ndof, bool)
     kept[space.dofs[there.reshape(-1, space.nq).any(axis=1)]] = True
-    return np.flatnonzero(~kept)
+    return np.flatnonzero(space.summed(kept.astype(float)) == 0.0)
 
 
 def _system(
@@ -130,8 +130,12 @@ def _system(
     there = {name: zone for name, zone in zones.items() if name not in stage.absent}
     if not isinstance(stage.goal, StrengthSearch):
         there = weaken(there, stage.strength, stage.spared)
-    solver = _solver(model, there, constraints, pattern, reduce)
-    return System(model.space, there, model.controls, constraints, pattern, reduce, solver, timer, stiffest, water)
+    solver = model.space.mesh.ranks.solver(constraints, model.space)
+    solver = solver or _solver(model, there, constraints, pattern, reduce)
+    counted = balanced(model.space, constraints, water)
+    return System(
+        *(model.space, there, model.controls, constraints, pattern, reduce, solver, timer, stiffest, water, counted)
+    )
 
 
 def _solver(

@@ -76,11 +76,12 @@ class Space:
 
     def dofs_on(self, boundary: str, component: str) -> np.ndarray:
         """Dofs of one component on a boundary, each once."""
-        nodes = np.unique(self.mesh.boundary(boundary))
-        return nodes * len(self.components) + self.component(component)
+        return self.mesh.nodes_on(boundary) * len(self.components) + self.component(component)
 
     def points_of(self, elements: np.ndarray) -> slice | np.ndarray:
         """The points of some elements, as a slice where they follow one another."""
+        if not len(elements):
+            return slice(0, 0)
         first, last = int(elements[0]), int(elements[-1]) + 1
         if len(elements) == last - first and (np.diff(elements) == 1).all():
             return slice(first * self.nq, last * self.nq)
@@ -97,7 +98,47 @@ class Space:
         force = np.zeros(self.ndof)
         operator = (self.kinematics.active, *self.kinematics.sparse_operator)
         _force(force, stress, self.weights, self.dofs, self.terms, *operator)
-        return force
+        return self.summed(force)
+
+    def summed(self, force: np.ndarray) -> np.ndarray:
+        """(ndof,) nodal forces with what the elements of other ranks add to them."""
+        return self.mesh.ranks.summed(force.reshape(len(self.mesh.points), -1)).ravel()
+
+    @cached_property
+    def counted(self) -> np.ndarray | slice:
+        """Which dofs this rank counts: all, or those of the nodes that it owns."""
+        owned = self.mesh.ranks.owned(np.arange(len(self.mesh.points)))
+        return owned if isinstance(owned, slice) else np.repeat(owned, len(self.components))
+
+    def dot(self, a: np.ndarray, b: np.ndarray) -> float:
+        """The product of two vectors of all dofs, or of the displacements, each dof counted once."""
+        counted = self.counted if isinstance(self.counted, slice) else self.counted[: len(a)]
+        return self.mesh.ranks.sum(float((a * b)[counted].sum()))
+
+    def norm(self, a: np.ndarray) -> float:
+        """The length of a vector of all dofs, or of the displacements, each dof counted once."""
+        return float(np.sqrt(self.dot(a, a)))
+
+    def total(self, values: np.ndarray, dofs: np.ndarray) -> float:
+        """The sum of values (ndof,) over some dofs, each counted once."""
+        return self.mesh.ranks.sum(float(values[self.once(dofs)].sum()))
+
+    def nodal_sum(self, values: np.ndarray, nodes: np.ndarray) -> float:
+        """The sum of values (n,) at some nodes (n,), each counted once."""
+        return self.mesh.ranks.sum(float(values[self.mesh.ranks.owned(nodes)].sum()))
+
+    def nodal_mean(self, values: np.ndarray, nodes: np.ndarray) -> float:
+        """The mean of values (n,) at some nodes (n,), each counted once."""
+        return self.nodal_sum(values, nodes) / self.nodal_sum(np.ones(len(nodes)), nodes)
+
+    def volume_mean(self, values: np.ndarray, weights: np.ndarray) -> np.ndarray:
+        """The mean (...) of values (n, ...) at points, weighted with their volumes (n,)."""
+        ranks = self.mesh.ranks
+        return ranks.sum(np.tensordot(weights, values, 1)) / ranks.sum(float(weights.sum()))
+
+    def once(self, dofs: np.ndarray) -> np.ndarray:
+        """Those of some dofs that this rank counts."""
+        return dofs if isinstance(self.counted, slice) else dofs[self.counted[dofs]]
 
     def displacement(self, u: np.ndarray) -> np.ndarray:
         """(nnodes, 3) displacement along the three axes of the kinematics."""
@@ -123,7 +164,9 @@ class Space:
         total = np.zeros((len(self.mesh.points), fitted.shape[2]))
         share = np.bincount(cells.ravel(), np.repeat(volume, cells.shape[1]), len(total))
         for k in range(total.shape[1]):
-            total[:, k] = np.bincount(cells.ravel(), (fitted[:, :, k] * volume[:, None]).ravel(), len(total)) / share
+            total[:, k] = np.bincount(cells.ravel(), (fitted[:, :, k] * volume[:, None]).ravel(), len(total))
+        ranks = self.mesh.ranks
+        total = ranks.summed(total) / ranks.summed(share[:, None])
         return total.reshape(len(total), *values.shape[1:])
 
     def nodal_within(self, values: np.ndarray) -> np.ndarray:
@@ -135,7 +178,8 @@ class Space:
         least, most = np.full(len(self.mesh.points), np.inf), np.full(len(self.mesh.points), -np.inf)
         np.minimum.at(least, cells, by_cell.min(axis=1)[:, None])
         np.maximum.at(most, cells, by_cell.max(axis=1)[:, None])
-        return np.clip(self.nodal(values), least, most)
+        ranks = self.mesh.ranks
+        return np.clip(self.nodal(values), -ranks.extreme(-least), ranks.extreme(most))
 
     @cached_property
     def _to_nodes(self) -> np.ndarray:

@@ -14,6 +14,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.sparse import block_diag
 
+from fabfem.fem.ranks import ALONE, Alone
 from fabfem.fem.space import Space
 
 MOTIONS = {
@@ -81,6 +82,20 @@ class Constraints:
     motion: np.ndarray
     tied: np.ndarray
     ties: np.ndarray
+    ranks: Alone = ALONE
+    own: np.ndarray | slice = field(default_factory=lambda: slice(None))
+    """Which tied dofs this rank counts."""
+
+    @property
+    def nunknowns(self) -> int:
+        """Unknowns, the motions of rigid bodies included, which are last and on every rank."""
+        return len(self.free) + self.ties.shape[1]
+
+    def counted(self, space: Space) -> np.ndarray | slice:
+        """Which unknowns this rank counts; the first rank counts the motions of rigid bodies."""
+        if isinstance(space.counted, slice):
+            return space.counted
+        return np.concatenate([space.counted[self.free], np.full(self.ties.shape[1], self.ranks.rank == 0)])
 
     def spread(self, unknowns: np.ndarray) -> np.ndarray:
         """The (ndof,) displacement T v."""
@@ -92,9 +107,10 @@ class Constraints:
 
     def collect(self, force: np.ndarray) -> np.ndarray:
         """The force Tᵀ f on the unknowns."""
-        if not len(self.tied):
+        if not self.ties.shape[1]:
             return force[self.free]
-        return np.concatenate([force[self.free], self.ties.T @ force[self.tied]])
+        resultants = self.ranks.sum(self.ties[self.own].T @ force[self.tied][self.own])
+        return np.concatenate([force[self.free], resultants])
 
     def keep_unknown(self, force: np.ndarray) -> np.ndarray:
         """The (ndof,) force without its part on dofs that are no unknowns."""
@@ -120,7 +136,8 @@ def constrain(
     tied, ties = _joined(follows)
     fixed = np.concatenate([np.array(list(moved), dtype=int), absent, tied])
     free = np.setdiff1d(np.arange(space.ndof), fixed)
-    constraints = Constraints(free, motion, tied, ties)
+    own = slice(None) if isinstance(space.counted, slice) else space.counted[tied]
+    constraints = Constraints(free, motion, tied, ties, space.mesh.ranks, own)
     _refuse_rigid_motion(space, constraints, absent)
     return constraints
 
@@ -173,15 +190,16 @@ def _follow(
     for name in body.motion:
         if name not in names:
             raise ValueError(f"a rigid body has no motion '{name}' here; it has {', '.join(names)}.")
-    also_held = np.array([dof in moved for dof in dofs.tolist()])
+    also_held = np.array([dof in moved for dof in dofs.tolist()], bool)
     asked = np.array([names.index(name) for name in body.motion], dtype=int)
     equations = np.concatenate([modes[also_held], np.eye(len(names))[asked]])
     values = np.array([*(moved[dof] for dof in dofs[also_held].tolist()), *body.motion.values()])
-    given, loose = _solutions(equations, values, body)
+    ranks = space.mesh.ranks
+    given, loose = _solutions(ranks.stacked(equations), ranks.stacked(values), body)
     dofs, modes = dofs[~also_held], modes[~also_held]
     motion[dofs] = modes @ given
     ties = modes @ loose
-    moving = np.linalg.norm(ties, axis=0) > EXACT * max(1.0, float(np.abs(modes).max(initial=0.0)))
+    moving = ranks.largest(np.linalg.norm(ties, axis=0)) > EXACT * max(1.0, _most(ranks, modes))
     return dofs, ties[:, moving]
 
 
@@ -200,22 +218,39 @@ def _solutions(equations: np.ndarray, values: np.ndarray, body: RigidBody) -> tu
     return given, rows[rank:].T
 
 
+def _most(ranks: Alone, values: np.ndarray) -> float:
+    return ranks.largest(float(np.abs(values).max(initial=0.0)))
+
+
+def _short(ranks: Alone, rows: np.ndarray) -> np.ndarray:
+    """A few rows with the same Gram matrix as the rows of all ranks together: the factor R of their QR."""
+    own = np.asarray(np.linalg.qr(rows, mode="r")) if len(rows) else rows
+    whole = ranks.stacked(own)
+    return np.asarray(np.linalg.qr(whole, mode="r")) if len(whole) else whole
+
+
+def _untied(constraints: Constraints, motions: np.ndarray) -> np.ndarray:
+    """What of motions (k, m) of the tied dofs their bodies cannot follow, as a few rows."""
+    n = constraints.ties.shape[1]
+    both = _short(constraints.ranks, np.hstack([constraints.ties, motions]))
+    ties, motions = both[:, :n], both[:, n:]
+    return motions - ties @ np.linalg.lstsq(ties, motions, rcond=EXACT)[0] if n else motions
+
+
 def _refuse_rigid_motion(space: Space, constraints: Constraints, absent: np.ndarray) -> None:
     """Raise where a rigid motion of all that is there is one that the constraints allow."""
-    points = space.mesh.points
-    size = float(np.ptp(points, axis=0).max())
-    centred = (points - points.mean(axis=0) * (not space.kinematics.radial)) / size
+    points, ranks = space.mesh.points, space.mesh.ranks
+    low, high = ranks.least(points.min(axis=0)), ranks.largest(points.max(axis=0))
+    centred = (points - 0.5 * (low + high) * (not space.kinematics.radial)) / float((high - low).max())
     modes = space.kinematics.modes(centred).reshape(-1, len(points) * len(space.components))
     modes = np.pad(modes, ((0, 0), (0, space.ndof - modes.shape[1])))
     allowed = np.concatenate([constraints.free, absent])
     against = modes.copy()
     against[:, allowed] = 0.0
-    if constraints.ties.shape[1]:
-        part = modes[:, constraints.tied].T
-        fitted = constraints.ties @ np.linalg.lstsq(constraints.ties, part, rcond=EXACT)[0]
-        against[:, constraints.tied] = (part - fitted).T
-    against[np.abs(against) < EXACT] = 0.0
-    loose = len(modes) - (np.linalg.matrix_rank(against, tol=EXACT) if against.any() else 0)
+    against[:, constraints.tied] = 0.0
+    rows = np.concatenate([_short(ranks, against.T), _untied(constraints, modes[:, constraints.tied].T)])
+    rows[np.abs(rows) < EXACT] = 0.0
+    loose = len(modes) - (np.linalg.matrix_rank(rows, tol=EXACT) if rows.any() else 0)
     if loose:
         motions = "one rigid motion" if loose == 1 else f"{loose} rigid motions"
         raise ValueError(f"the supports leave {motions} of the body free; hold more components.")

@@ -11,7 +11,7 @@ import numpy as np
 from scipy.sparse import csr_matrix
 
 from fabfem.fem.assembly import Pattern
-from fabfem.fem.linear import LinearSolver, norm
+from fabfem.fem.linear import LinearSolver
 from fabfem.fem.model import Batch, Controls, Refusal, States, Zone, elastic_tangents, update_points
 from fabfem.fem.pores import Water
 from fabfem.fem.reduction import Reduction
@@ -37,6 +37,8 @@ class System(NamedTuple):
     """Largest diagonal entry of the elastic stiffness."""
     water: Water | None = None
     """What pore water does, where its pressure is unknown."""
+    balanced: np.ndarray | slice = slice(None)
+    """Unknowns whose forces count on this rank in lengths and products: all, or those that are no pressures and its."""
 
 
 class Equilibrium(NamedTuple):
@@ -110,7 +112,9 @@ def _let_out(system: System, old: Equilibrium, motion: np.ndarray) -> None:
 
 def begun(system: System, old: Equilibrium, size: float) -> np.ndarray:
     """The (ndof,) internal force at the start of an increment, water included."""
-    return old.force if system.water is None else old.force + system.water.start(old.displacement, size)
+    if system.water is None:
+        return old.force
+    return old.force + system.space.summed(system.water.start(old.displacement, size))
 
 
 def attempt(system: System, old: Equilibrium, task: Task, step: np.ndarray) -> Trial | Refusal:
@@ -118,33 +122,40 @@ def attempt(system: System, old: Equilibrium, task: Task, step: np.ndarray) -> T
     strain = system.space.strain(step)
     with system.timer.phase("material"):
         batch = update_points(system.zones, strain, old.states, system.controls.held)
+    batch = system.space.mesh.ranks.agreed(batch, system.space.nq, system.controls.held)
     if isinstance(batch, Refusal):
         return batch
     with system.timer.phase("assembly"):
         drag = _drag(system, task, strain)
-        water = _water(old, task, step)
+        water = _water(system, old, task, step)
         force = system.space.internal_force(batch.stress) + drag + water
     unbalanced = system.constraints.collect(task.load - force)
-    size = norm(mechanical(system, unbalanced))
-    residual = relative(size, mechanical(system, force), task.load)
+    size = float(np.sqrt(work(system, unbalanced, unbalanced)))
+    residual = relative(system, size, force, task.load)
     if system.water is not None:
         residual = max(residual, system.water.misfit(step, water, system.constraints.free))
     return Trial(step, batch, force, drag, water, unbalanced, size, residual)
 
 
-def mechanical(system: System, values: np.ndarray) -> np.ndarray:
-    """Forces, of all dofs or of the unknowns, without the volumes of water."""
-    if system.water is None:
-        return values
-    if len(values) == system.space.ndof:
-        return values[: system.water.nmotion]
-    return np.delete(values, np.flatnonzero(system.constraints.free >= system.water.nmotion))
+def work(system: System, a: np.ndarray, b: np.ndarray) -> float:
+    """The product of forces and motions of the unknowns, without the volumes of water."""
+    return system.space.mesh.ranks.sum(float((a * b)[system.balanced].sum()))
 
 
-def _water(old: Equilibrium, task: Task, step: np.ndarray) -> np.ndarray:
+def balanced(space: Space, constraints: Constraints, water: Water | None) -> np.ndarray | slice:
+    """Which unknowns count in `work`, each on one rank."""
+    counted = constraints.counted(space)
+    if water is None:
+        return counted
+    forces = np.ones(constraints.nunknowns, bool)
+    forces[: len(constraints.free)] = constraints.free < water.nmotion
+    return forces if isinstance(counted, slice) else forces & counted
+
+
+def _water(system: System, old: Equilibrium, task: Task, step: np.ndarray) -> np.ndarray:
     if task.wet is None or task.start is None:
         return np.zeros(len(step))
-    return task.start - old.force + task.wet @ step
+    return task.start - old.force + system.space.summed(task.wet @ step)
 
 
 def _drag(system: System, task: Task, strain: np.ndarray) -> np.ndarray:
@@ -153,7 +164,8 @@ def _drag(system: System, task: Task, strain: np.ndarray) -> np.ndarray:
     return system.space.internal_force((task.viscous @ strain[:, :, None])[:, :, 0])
 
 
-def relative(size: float, force: np.ndarray, load: np.ndarray) -> float:
-    """The norm of an out-of-balance force over the larger of internal and external force."""
-    scale = max(norm(force), norm(load))
+def relative(system: System, size: float, force: np.ndarray, load: np.ndarray) -> float:
+    """The norm of an out-of-balance force over the larger of internal and external force (ndof,)."""
+    forces = slice(None if system.water is None else system.water.nmotion)
+    scale = max(system.space.norm(force[forces]), system.space.norm(load))
     return size / scale if scale > 0.0 else 0.0

@@ -4,13 +4,14 @@ One is written after an increment when the case's number of increments or second
 so often that writing takes more than a twentieth of the time; and one when a run ends, however it ends.
 """
 
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from time import perf_counter
 from typing import Any, NamedTuple
 
 from fabfem.output.archive import ArchiveError, read_archive, write_archive
 
-PATTERN = "checkpoint_*.npz"
+PATTERN, SHARES = "checkpoint_*.npz", "share_*.npz"
 KEPT = 2
 SHARE = 0.05
 """Share of the time that may go into checkpoints written by the clock."""
@@ -25,6 +26,10 @@ class Checkpoint(NamedTuple):
     """Where its march can be taken up."""
     written: dict[str, Any]
     """What its files had come to, by writer."""
+    share: Any = None
+    """What of the mesh the process had that wrote it (`fabfem.fem.share`)."""
+    shares: int = 1
+    """Processes that shared the run; those of the others are ``share_000012_0001.npz`` and on beside it."""
 
 
 class Checkpoints:
@@ -37,9 +42,21 @@ class Checkpoints:
         Time between two [s].
     increments : int or None
         Increments between two, whatever the time.
+    rank : int
+        Number of this process among those that share the run; the first writes last, so that its file means all.
+    wait : callable
+        Returns when all processes have called it.
     """
 
-    def __init__(self, folder: Path, seconds: float, increments: int | None = None) -> None:
+    def __init__(
+        self,
+        folder: Path,
+        seconds: float,
+        increments: int | None = None,
+        rank: int = 0,
+        wait: Callable[[], Any] = lambda: None,
+    ) -> None:
+        self._rank, self._wait = rank, wait
         self.folder, self.seconds, self.increments = folder, seconds, increments
         self._at, self._cost, self._count, self._number = perf_counter(), 0.0, 0, -1
 
@@ -55,11 +72,45 @@ class Checkpoints:
         if number == self._number:
             return
         begun = perf_counter()
-        write_archive(self.folder / f"checkpoint_{number:06d}.npz", checkpoint)
-        for file in sorted(self.folder.glob(PATTERN))[:-KEPT]:
-            file.unlink()
+        if self._rank:
+            write_archive(_share(self.folder, number, self._rank), checkpoint)
+        self._wait()
+        if not self._rank:
+            write_archive(self.folder / f"checkpoint_{number:06d}.npz", checkpoint)
+            self._forget()
         self._at, self._count, self._number = perf_counter(), 0, number
         self._cost = self._at - begun
+
+    def _forget(self) -> None:
+        """Remove all checkpoints but the last two, with their shares."""
+        for file in sorted(self.folder.glob(PATTERN))[:-KEPT]:
+            file.unlink()
+            for share in self.folder.glob(f"share_{_number(file):06d}_*.npz"):
+                share.unlink()
+
+
+def _share(folder: Path, number: int, rank: int) -> Path:
+    return folder / f"share_{number:06d}_{rank:04d}.npz"
+
+
+def _number(file: Path) -> int:
+    return int(file.stem.removeprefix("checkpoint_"))
+
+
+def pieces(folder: Path, first: Checkpoint) -> Iterator[Checkpoint]:
+    """Yield the checkpoints of all processes that shared a run, `first` the one that stands for them.
+
+    Raises
+    ------
+    ArchiveError
+        If one is damaged or missing.
+    """
+    yield first
+    for rank in range(1, first.shares):
+        try:
+            yield read_archive(_share(folder, first.start.number, rank))
+        except OSError as error:
+            raise ArchiveError(f"{error.filename} is missing") from None
 
 
 def newest(folder: Path) -> Checkpoint | None:
@@ -87,5 +138,6 @@ def newest(folder: Path) -> Checkpoint | None:
 
 def clear(folder: Path) -> None:
     """Remove the checkpoints of an earlier run."""
-    for file in folder.glob(PATTERN):
-        file.unlink()
+    for pattern in (PATTERN, SHARES):
+        for file in folder.glob(pattern):
+            file.unlink()

@@ -55,6 +55,24 @@ class History:
         self._file.close()
 
 
+class Unheard(History):
+    """The table of a run on a process that writes none."""
+
+    def __init__(self, headers: Sequence[str]) -> None:
+        self.width = len(headers)
+
+    @property
+    def size(self) -> int:
+        """Nothing."""
+        return 0
+
+    def _put(self, row: Sequence[str | int | float]) -> None:
+        """Write nothing."""
+
+    def close(self) -> None:
+        """Close nothing."""
+
+
 def read_history(path: Path) -> tuple[list[str], list[list[str]]]:
     """Return the header and the rows of a history; a last line cut short by a kill is dropped.
 

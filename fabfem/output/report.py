@@ -17,15 +17,15 @@ import numpy as np
 from fabfem import __version__
 from fabfem.output.atomic import write_atomic
 
-PACKAGES = ("numpy", "scipy", "numba", "scikit-fem", "meshio", "pydantic", "pypardiso")
+PACKAGES = ("numpy", "scipy", "numba", "scikit-fem", "meshio", "pydantic", "pypardiso", "mpi4py", "petsc4py")
 WORST = 5
 """Number of worst points kept."""
 
 
 class Report:
-    """The report of a run, kept as plain values and written on demand."""
+    """The report of a run, kept as plain values and written on demand; without a path it is not written."""
 
-    def __init__(self, path: Path, **head: Any) -> None:
+    def __init__(self, path: Path | None, **head: Any) -> None:
         self.path = path
         self.content: dict[str, Any] = {
             "status": "running",
@@ -61,7 +61,8 @@ class Report:
         """Write the file with the wall time by phase [s] as it stands."""
         self.content["wall_time"] = {phase: round(seconds, 4) for phase, seconds in wall_time.items()}
         self.content["peak_memory"] = round(peak_memory(), 1)
-        write_atomic(self.path, json.dumps(self.content, indent=1, default=_plain, allow_nan=False) + "\n")
+        if self.path is not None:
+            write_atomic(self.path, json.dumps(self.content, indent=1, default=_plain, allow_nan=False) + "\n")
 
 
 def versions() -> dict[str, str]:

@@ -10,7 +10,7 @@ import struct
 import zlib
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 from xml.etree import ElementTree
 from xml.sax.saxutils import quoteattr
 
@@ -73,15 +73,22 @@ class FieldFiles:
         self._geometry = _geometry(points, cells, cell_type)
         self.stored = list(stored)
         if stored:
-            write_atomic(folder / "fields.pvd", self._collection())
+            self._list_all()
 
     def write(self, frame: Frame) -> Path:
         """Store a frame and list it in the collection; return its file."""
         name = f"fields_{len(self.stored):04d}.vtu"
         write_atomic(self.folder / name, "\n".join(self._lines(frame)))
-        self.stored.append((frame.time, name))
-        write_atomic(self.folder / "fields.pvd", self._collection())
+        self._listed(frame.time, name)
         return self.folder / name
+
+    def _listed(self, time: float, name: str) -> None:
+        """List a file in the collection."""
+        self.stored.append((time, name))
+        self._list_all()
+
+    def _list_all(self) -> None:
+        write_atomic(self.folder / "fields.pvd", self._collection())
 
     def _lines(self, frame: Frame) -> Iterator[str]:
         yield '<?xml version="1.0"?>'
@@ -105,6 +112,53 @@ class FieldFiles:
         entries = [f'<DataSet timestep="{time!r}" part="0" file="{name}"/>' for time, name in self.stored]
         head = f'<?xml version="1.0"?>\n<!-- {self.note} -->\n<VTKFile type="Collection" version="1.0"><Collection>'
         return "\n".join([head, *entries, "</Collection></VTKFile>\n"])
+
+
+class FieldPieces(FieldFiles):
+    """The files of a run that many ranks share: of each stored increment a ``.pvtu`` and a ``.vtu`` of every rank.
+
+    Every rank makes one of these for its part of the mesh; the first writes the ``.pvtu`` and the collection.
+    """
+
+    def __init__(self, rank: int, size: int, *args: Any, **more: Any) -> None:
+        self._rank, self._size = rank, size
+        super().__init__(*args, **more)
+
+    def write(self, frame: Frame) -> Path:
+        """Store this rank's piece of a frame, and on the first rank what holds the pieces together; return its file."""
+        name = f"fields_{len(self.stored):04d}"
+        write_atomic(self.folder / self._piece(name, self._rank), "\n".join(self._lines(frame)))
+        if self._rank == 0:
+            write_atomic(self.folder / f"{name}.pvtu", "\n".join(self._together(name, frame)))
+        self._listed(frame.time, f"{name}.pvtu")
+        return self.folder / f"{name}.pvtu"
+
+    def _list_all(self) -> None:
+        if self._rank == 0:
+            super()._list_all()
+
+    def _piece(self, name: str, rank: int) -> str:
+        return f"{name}_{rank:04d}.vtu"
+
+    def _together(self, name: str, frame: Frame) -> Iterator[str]:
+        yield '<?xml version="1.0"?>'
+        yield f"<!-- {self.note} -->"
+        yield (
+            '<VTKFile type="PUnstructuredGrid" version="1.0" byte_order="LittleEndian" header_type="UInt64"'
+            ' compressor="vtkZLibDataCompressor"><PUnstructuredGrid GhostLevel="0">'
+        )
+        yield "<FieldData>"
+        yield _array("TimeValue", np.array([frame.time]), tuples=True)
+        yield "</FieldData>"
+        for place, fields in (("PPointData", frame.at_nodes), ("PCellData", frame.in_cells)):
+            yield f"<{place}>"
+            yield from (
+                _head(field, np.asarray(values, dtype=np.float32), "P") + "/>" for field, values in fields.items()
+            )
+            yield f"</{place}>"
+        yield f"<PPoints>{_head('Points', np.zeros((0, 3)), 'P')}/></PPoints>"
+        yield from (f'<Piece Source="{self._piece(name, rank)}"/>' for rank in range(self._size))
+        yield "</PUnstructuredGrid></VTKFile>\n"
 
 
 def frames_of(folder: Path) -> list[tuple[float, Path]]:
@@ -132,24 +186,27 @@ def _geometry(points: NDArray[np.float64], cells: NDArray[np.integer], cell_type
     )
 
 
-def _array(name: str, values: NDArray[np.generic], tuples: bool = False) -> str:
-    """Return a DataArray element with one zlib block of little-endian values."""
+def _head(name: str, values: NDArray[np.generic], prefix: str = "", more: Mapping[str, str] = {}) -> str:
+    """Return the beginning of a DataArray element, open for further attributes."""
     width = int(np.prod(values.shape[1:], dtype=int))
     attributes = {
         "type": TYPES[values.dtype.str[1:]],
         "Name": name,
         **({"NumberOfComponents": str(width)} if values.ndim > 1 else {}),
         **{f"ComponentName{i}": part for i, part in enumerate(_component_names(width))},
-        **({"NumberOfTuples": str(len(values))} if tuples else {}),
-        "format": "binary",
+        **more,
     }
+    return f"<{prefix}DataArray {' '.join(f'{key}={quoteattr(text)}' for key, text in attributes.items())}"
+
+
+def _array(name: str, values: NDArray[np.generic], tuples: bool = False) -> str:
+    """Return a DataArray element with one zlib block of little-endian values."""
+    more = {**({"NumberOfTuples": str(len(values))} if tuples else {}), "format": "binary"}
     raw = np.ascontiguousarray(values, dtype=values.dtype.newbyteorder("<")).tobytes()
     packed = zlib.compress(raw, 1)
     header = struct.pack("<4Q", 1, len(raw), len(raw), len(packed))
     content = (base64.b64encode(header) + base64.b64encode(packed)).decode()
-    return (
-        f"<DataArray {' '.join(f'{key}={quoteattr(text)}' for key, text in attributes.items())}>{content}</DataArray>"
-    )
+    return f"{_head(name, values, more=more)}>{content}</DataArray>"
 
 
 def _component_names(width: int) -> Sequence[str]:

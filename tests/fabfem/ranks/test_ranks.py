@@ -1,0 +1,200 @@
+"""A scene that several processes share: the same history as alone, one series of fields, one reason where it fails.
+
+The runs are those of `scenes.py`, all of them in one call of ``mpiexec``. Without an installation of MPI, PETSc and
+their Python packages what needs them is passed over, and the report says so.
+"""
+
+import csv
+import json
+import os
+import shutil
+import subprocess
+import sys
+from importlib.util import find_spec
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scenes import SCENES
+
+HERE = Path(__file__).parent
+MISSING = [name for name in ("mpi4py", "petsc4py") if not find_spec(name)]
+MISSING += [] if shutil.which("mpiexec") else ["mpiexec"]
+needs_mpi = pytest.mark.skipif(bool(MISSING), reason=f"no shared runs: {', '.join(MISSING)} is not installed")
+CALM = {
+    **{"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1", "OMPI_MCA_mpi_yield_when_idle": "1"},
+    **{"OMPI_MCA_rmaps_base_oversubscribe": "1", "OMPI_MCA_hwloc_base_binding_policy": "none"},
+}
+"""Lets Open MPI start more processes than there are cores, as root in a container too."""
+EXACT = [name for name in SCENES if name not in ("multigrid", "split")]
+
+
+def started(ranks: int, *words: str | Path) -> subprocess.CompletedProcess[str]:
+    """Run a program of Python in some processes of MPI, or in one without it."""
+    launcher = ["mpiexec", "-n", str(ranks)] if ranks else []
+    home = {"PYTHONPATH": str(HERE.parents[2])}
+    command = [*launcher, sys.executable, *map(str, words)]
+    return subprocess.run(command, env=os.environ | CALM | home, capture_output=True, text=True, check=False)
+
+
+def ran(home: Path, ranks: int, names: list[str], *more: str) -> subprocess.CompletedProcess[str]:
+    """Run some scenes into a folder."""
+    home.mkdir(exist_ok=True)
+    for name in names:
+        (home / f"{name}.toml").write_text(SCENES[name], encoding="utf-8")
+    return started(ranks, HERE / "scenes.py", home, *names, *more)
+
+
+def table(folder: Path) -> tuple[list[str], list[str], np.ndarray]:
+    """Return header, stages and numbers of a history."""
+    with (folder / "history.csv").open(encoding="utf-8") as file:
+        header, *rows = csv.reader(file)
+    return header[1:], [row[0] for row in rows], np.array([row[1:] for row in rows], float)
+
+
+def apart(one: Path, other: Path) -> dict[str, float]:
+    """Return how far two histories are apart by column, over the largest value of the columns with its unit."""
+    (header, stages, a), (again, others, b) = table(one), table(other)
+    assert (header, stages) == (again, others)
+    units = np.array([name.partition("[")[2] for name in header])
+    sizes = [np.abs(a[:, units == unit]).max() for unit in units]
+    return {name: float(np.abs(a - b)[:, k].max() / max(sizes[k], 1e-300)) for k, name in enumerate(header)}
+
+
+@pytest.fixture(scope="module")
+def alone(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    home = tmp_path_factory.mktemp("alone")
+    done = ran(home, 0, EXACT)
+    assert done.returncode == 0, done.stderr
+    return home
+
+
+@pytest.fixture(scope="module")
+def shared(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    home = tmp_path_factory.mktemp("shared")
+    done = ran(home, 2, list(SCENES))
+    assert done.returncode == 0, done.stderr
+    return home
+
+
+@needs_mpi
+@pytest.mark.parametrize("name", EXACT)
+def test_two_ranks_write_the_history_of_one_process(name: str, alone: Path, shared: Path) -> None:
+    assert len(table(alone / name)[2]) > 2
+    assert max(apart(alone / name, shared / name).values()) < 1e-8
+
+
+@needs_mpi
+@pytest.mark.parametrize(("name", "direct"), [("multigrid", "solid"), ("split", "wet")])
+def test_multigrid_finds_what_the_direct_solver_finds(name: str, direct: str, alone: Path, shared: Path) -> None:
+    found = {name: gap for name, gap in apart(alone / direct, shared / name).items() if not name.startswith("iter")}
+    assert max(found.values()) < 1e-5
+    ranks = json.loads((shared / name / "report.json").read_text(encoding="utf-8"))["ranks"]
+    assert ranks["direct_instead"] == [0.0, 0.0]
+    assert ranks["linear_iterations"][0] < 40 * ranks["solves"][0]
+
+
+@needs_mpi
+def test_the_report_tells_what_each_rank_had(shared: Path) -> None:
+    ranks = json.loads((shared / "dry" / "report.json").read_text(encoding="utf-8"))["ranks"]
+    assert sum(ranks["elements"]) == 24
+    assert sum(ranks["unknowns"]) == 2 * 93
+    assert max(ranks["points"]) < 24 * 4
+    assert ranks["imbalance"]["elements"] < 1.2
+    assert min(ranks["material"]) > 0.0
+
+
+@needs_mpi
+def test_the_pieces_are_opened_as_one(alone: Path, shared: Path) -> None:
+    import pyvista
+
+    whole, pieces = (pyvista.get_reader(home / "dry" / "fields.pvd") for home in (alone, shared))
+    assert whole.time_values == pieces.time_values
+    for reader in (whole, pieces):
+        reader.set_active_time_value(whole.time_values[-1])
+    one, other = whole.read()[0], pieces.read()[0]
+    assert one.n_cells == other.n_cells
+    nearest = other.find_closest_point
+    order = [nearest(point) for point in one.points]
+    for name in ("displacement", "stress", "p"):
+        np.testing.assert_allclose(other.point_data[name][order], one.point_data[name], rtol=1e-5, atol=1e-5)
+
+
+@needs_mpi
+@pytest.mark.parametrize(("first", "then"), [(2, 3), (2, 0), (0, 2)])
+def test_a_checkpoint_of_some_ranks_is_read_by_others(
+    first: int, then: int, alone: Path, shared: Path, tmp_path: Path
+) -> None:
+    shutil.copytree({0: alone, 2: shared}[first] / "dry", tmp_path / "dry")
+    last = sorted((tmp_path / "dry").glob("checkpoint_*.npz"))[-1]
+    last.unlink()
+    kept = sorted((tmp_path / "dry").glob("checkpoint_*.npz"))
+    assert kept, "there is nothing to go on from"
+    report = tmp_path / "dry" / "report.json"
+    report.unlink()
+    done = ran(tmp_path, then, ["dry"], "--resume")
+    assert done.returncode == 0, done.stderr
+    assert max(apart(alone / "dry", tmp_path / "dry").values()) < 1e-8
+    assert json.loads(report.read_text(encoding="utf-8"))["status"] == "completed"
+
+
+@needs_mpi
+def test_a_rank_that_fails_stops_all_with_its_reason(tmp_path: Path) -> None:
+    program = tmp_path / "fails.py"
+    program.write_text(
+        "import sys; from pathlib import Path\n"
+        "from mpi4py import MPI\n"
+        "import fabfem.boundary_value.record as record\n"
+        "kept = record.Recorder.add\n"
+        "def add(self, increment):\n"
+        "    if MPI.COMM_WORLD.rank == 1 and increment.number == 3:\n"
+        "        raise OSError(28, 'No space left on device')\n"
+        "    kept(self, increment)\n"
+        "record.Recorder.add = add\n"
+        "from fabfem.cli import main\n"
+        "sys.exit(main(['solve', sys.argv[1], '--out', sys.argv[2], '--quiet']))\n",
+        encoding="utf-8",
+    )
+    (tmp_path / "dry.toml").write_text(SCENES["dry"], encoding="utf-8")
+    done = started(2, program, tmp_path / "dry.toml", tmp_path / "out")
+    assert done.returncode != 0
+    assert "rank 1 of 2" in done.stderr
+    assert "No space left on device" in done.stderr
+    assert [row[0] for row in table(tmp_path / "out")[2].tolist()][:2] == [1.0, 2.0]
+    report = json.loads((tmp_path / "out" / "report.json").read_text(encoding="utf-8"))
+    assert (report["status"], "No space" in report["reason"]) == ("stopped", True)
+
+
+@needs_mpi
+@pytest.mark.parametrize(
+    ("wrong", "right", "said"),
+    [
+        ('boundary = "top"', 'boundary = "topp"', "the mesh has no boundary 'topp'"),
+        ("k0 = 0.6", "k0 = 0.6\n[solver]\nlinear = 'superlu'", "is a solver of one process"),
+        ("k0 = 0.6", "k0 = 0.6\n[errors]\nestimate = ['discretisation']", "one process has the mesh"),
+        ('fix = ["x", "y"]', 'fix = ["x"]', "one rigid motion"),
+    ],
+)
+def test_bad_input_is_said_once(wrong: str, right: str, said: str, tmp_path: Path) -> None:
+    (tmp_path / "bad.toml").write_text(SCENES["dry"].replace(wrong, right), encoding="utf-8")
+    done = started(2, "-m", "fabfem", "solve", tmp_path / "bad.toml", "--out", tmp_path / "out")
+    assert done.returncode == 2
+    (line,) = [line for line in done.stderr.splitlines() if line.startswith("fabfem:")]
+    assert "bad.toml" in line
+    assert said in line
+
+
+@pytest.mark.skipif(not MISSING, reason="what it needs is installed")
+def test_what_is_missing_is_said(tmp_path: Path) -> None:
+    (tmp_path / "solid.toml").write_text(SCENES["multigrid"], encoding="utf-8")
+    done = started(0, "-m", "fabfem", "solve", tmp_path / "solid.toml", "--out", tmp_path / "out")
+    assert done.returncode == 2
+    assert "fabfem[mpi]" in done.stderr
+
+
+def test_a_run_of_one_process_imports_nothing_of_mpi(tmp_path: Path) -> None:
+    (tmp_path / "dry.toml").write_text(SCENES["dry"], encoding="utf-8")
+    code = "import sys; from fabfem.cli import main; main(sys.argv[1:]); print(sorted(sys.modules))"
+    done = started(0, "-c", code, "solve", tmp_path / "dry.toml", "--out", tmp_path / "out", "--quiet")
+    assert "fabfem.fem.ranks" in done.stdout
+    assert not [name for name in ("mpi4py", "petsc4py", "fabfem.parallel.rank") if f"'{name}'" in done.stdout]
