@@ -21,13 +21,9 @@ ASIDE = {"title", "checkpoint", "sweep", "study", "calibration"}
 
 def identity(case: Case, **files: str) -> dict[str, Any]:
     """Return the identity of a run: ``case``, ``version``, the `files` (name -> hash) and the ``hash`` of all."""
-    found = {"case": told(case), "version": versions() | {"sources": sources()}, **files}
+    told = json.loads(json.dumps(case.model_dump(mode="json", exclude_none=True, exclude=ASIDE)))
+    found = {"case": told, "version": versions() | {"sources": sources()}, **files}
     return found | {"hash": hashed(json.dumps(found, sort_keys=True).encode())}
-
-
-def told(case: Case) -> dict[str, Any]:
-    """Return the tables of a case that decide its numbers, with all defaults, as JSON has them."""
-    return dict(json.loads(json.dumps(case.model_dump(mode="json", exclude_none=True, exclude=ASIDE))))
 
 
 def hashed(*parts: bytes | np.ndarray) -> str:

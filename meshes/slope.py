@@ -33,6 +33,8 @@ class Slope(NamedTuple):
 
 SLOPES = {
     "slope_2to1": Slope(height=10.0, run=20.0, crest=12.0, fine=0.45, coarse=1.0),
+    "slope_2to1_medium": Slope(height=10.0, run=20.0, crest=12.0, fine=0.9, coarse=2.0),
+    "slope_2to1_fine": Slope(height=10.0, run=20.0, crest=12.0, fine=0.3, coarse=0.7),
     "slope_2to1_coarse": Slope(height=10.0, run=20.0, crest=10.0, fine=2.0, coarse=2.5),
     "slope_45": Slope(height=10.0, run=10.0, crest=12.0, toe=8.0, depth=5.0, fine=0.5, coarse=1.5),
     "slope_2to1_ground": Slope(height=10.0, run=20.0, crest=12.0, toe=10.0, depth=5.0, fine=0.6, coarse=1.6),

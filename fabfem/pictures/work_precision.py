@@ -4,6 +4,7 @@ import json
 import math
 from collections.abc import Sequence
 from pathlib import Path
+from textwrap import fill
 from typing import Any
 
 COLOURS = ("#1f5a8a", "#c1662f", "#3c7d4f", "#8a3f7a", "#6b6b2a", "#4a4a9a", "#a0303a", "#2a8a8a")
@@ -28,7 +29,7 @@ def draw(folder: Path) -> Path:
     clock = "wall" if study["clock"] == "wall" else "processor"
     quantity = study["quantity"]["column"].replace("_", " ")
     axes.set(xscale="log", yscale="log", xlabel=f"{clock} time [s]", ylabel=f"relative error of {quantity}")
-    axes.set_title(study["title"] or study["case"], fontsize=11)
+    axes.set_title(fill(study["title"] or study["case"], 90), fontsize=11)
     axes.grid(alpha=0.25, which="both")
     axes.spines[["top", "right"]].set_visible(False)
     axes.legend(fontsize=9)

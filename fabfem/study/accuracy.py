@@ -9,14 +9,12 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from fabfem.case import Case, CaseError
-from fabfem.identity import differences, told
+from fabfem.identity import ASIDE, differences
 from fabfem.output.atomic import write_atomic
 from fabfem.study.verdict import listed
 
 CLASSES = (0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5)
 """Errors that a class ends at."""
-
-ASIDE = ("output", "errors")
 
 
 class Accuracy(NamedTuple):
@@ -56,8 +54,9 @@ def keep(case: Case, folder: Path) -> Path:
 
 
 def _settings(case: Case) -> dict[str, Any]:
-    """Return the case without what only says more about it."""
-    return {name: table for name, table in told(case).items() if name not in ASIDE}
+    """Return what the case says, without defaults and without what only says more about it."""
+    aside = ASIDE | {"output", "errors"}
+    return dict(json.loads(json.dumps(case.model_dump(mode="json", exclude_defaults=True, exclude=aside))))
 
 
 def accuracy_of(case: Case) -> Accuracy | None:
