@@ -178,7 +178,9 @@ def _show(options: argparse.Namespace) -> int:
 def _gallery(options: argparse.Namespace) -> int:
     from fabfem.gallery import RIGHT, case_files, gallery
 
-    shown = gallery(case_files(options.cases), options.out, options.quiet, options.pictures)
+    files = case_files(options.cases)
+    folder = options.out or Path("results") / "gallery" / files[0].parent.name
+    shown = gallery(files, folder, options.quiet, options.pictures)
     return DONE if all(one.status == RIGHT for one in shown) else STOPPED
 
 
@@ -303,7 +305,7 @@ def _parser() -> argparse.ArgumentParser:
         "cases", type=Path, metavar="FOLDER", help="folder of cases, or its name in cases: element, ..."
     )
     gallery.add_argument(
-        "--out", type=Path, metavar="DIR", default=Path("results/gallery"), help="folder of the results"
+        "--out", type=Path, metavar="DIR", help="folder of the results (default: results/gallery/FOLDER)"
     )
     gallery.add_argument("--pictures", type=Path, metavar="DIR", help="folder that gets a copy of every picture")
     gallery.set_defaults(command=_gallery)
