@@ -161,7 +161,7 @@ def test_the_commands_in_a_text(page: str) -> None:
 def test_every_block_that_is_not_run_is_known() -> None:
     """Their number is small; a new one is a decision."""
     left = [(page, block[1]) for page in PAGES for block in blocks(page) if block[0] in ("not run", "parsed")]
-    assert len(left) <= 11, left
+    assert len(left) <= 13, left
 
 
 CHECK = """

@@ -18,7 +18,6 @@ from fabfem.boundary_value.shares import blame, dealt
 from fabfem.case import BoundaryValueCase, CaseError
 from fabfem.fem.flow import UNDECIDED
 from fabfem.fem.increment import Collapsed, Increment, Stopped
-from fabfem.fem.share import share_of
 from fabfem.fem.solve import march
 from fabfem.fem.start import misfit
 from fabfem.identity import identity
@@ -70,7 +69,7 @@ def run(
         known = identity(case, mesh=problem.model.space.mesh.ranks.told() or hash_of(problem.model.space.mesh))
         begun = checkpoint_of(restart, folder, known)
         if begun:
-            begun = dealt(begun, restart.branch or folder, share_of(problem.model.space))
+            begun = dealt(begun, restart.branch or folder, problem.model.space, known["mesh"])
         steps = _steps(problem, begun, restart)
     ranks = problem.model.space.mesh.ranks
     with claimed(folder) if ranks.rank == 0 else nullcontext():

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from fabfem.case import CaseError
-from fabfem.fem.share import Share, carried
+from fabfem.fem.share import carried, share_of
 from fabfem.fem.space import Space
 from fabfem.output.archive import ArchiveError
 from fabfem.output.atomic import write_atomic
@@ -50,16 +50,30 @@ def blame(folder: Path, rank: int, error: BaseException) -> None:
         write_atomic(path, json.dumps(content, indent=1) + "\n")
 
 
-def dealt(found: Checkpoint, folder: Path, here: Share) -> Checkpoint:
+def dealt(found: Checkpoint, folder: Path, space: Space, mesh: str) -> Checkpoint:
     """Return a checkpoint of `folder` as far as this process has the mesh, from the shares of those that wrote it.
+
+    Parameters
+    ----------
+    found : Checkpoint
+        What was found in the folder.
+    folder : Path
+        Where its shares are.
+    space : Space
+        What this process has.
+    mesh : str
+        Hash of the whole mesh.
 
     Raises
     ------
     CaseError
-        If a share is missing or damaged.
+        If a share is missing or damaged, or several processes are to take up the state of another mesh.
     """
-    if found.shares == 1 and (found.share is None or len(here.elements) == len(found.share.elements)):
+    if found.shares == 1 and space.mesh.ranks.size == 1:
         return found
+    if found.identity["mesh"] != mesh:
+        raise CaseError(f"{folder}: its state is that of another mesh, and cannot be dealt out to several processes")
+    here = share_of(space)
     try:
         both = carried(
             ((piece.share, (piece.start, piece.written["pending"])) for piece in pieces(folder, found)), here

@@ -155,6 +155,7 @@ def _drawn(row: Measured, said: Study, best: bool) -> dict[str, Any]:
     knob = names[0] if len(names) == 1 else ""
     return {
         "label": label(row.run.choice),
+        "setting": label(row.run.choice) if row.run.choice else "",
         "knob": knob,
         "value": text(row.run.choice[0].value) if knob else "",
         "time": row.time(said.clock),

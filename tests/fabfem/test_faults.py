@@ -104,6 +104,7 @@ def test_an_interrupted_element_test(tmp_path: Path) -> None:
 
 def test_the_first_interrupt_waits_and_the_second_does_not() -> None:
     said: list[str] = []
+    before = signal.getsignal(signal.SIGINT)
     with pytest.raises(KeyboardInterrupt), patient(said.append) as asked:  # noqa: PT012
         assert not asked()
         with held_back():
@@ -113,7 +114,7 @@ def test_the_first_interrupt_waits_and_the_second_does_not() -> None:
         assert "finished first" in said[0]
         signal.raise_signal(signal.SIGINT)
         pytest.fail("the second one did not arrive")
-    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    assert signal.getsignal(signal.SIGINT) is before
 
 
 def test_a_thread_that_is_not_the_main_one_runs_all_the_same(folder: Path) -> None:
