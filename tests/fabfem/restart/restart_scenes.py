@@ -62,6 +62,12 @@ def weakened() -> dict[str, Any]:
     return scene(clay, stage=stages, support=sides, mesh=mesh, probe=points)
 
 
+def pressed_by_a_body() -> dict[str, Any]:
+    """Return a block of metal under an eccentric force on a rigid body."""
+    body = [{"boundary": "top", "point": [0.6, 0.0], "force": {"y": -50.0}}]
+    return scene(METAL, {"name": "press", "kind": "load", "rigid": body, "pressure": [BESIDE], "increments": STEPS})
+
+
 def along(kind: dict[str, Any]) -> dict[str, Any]:
     """Return a block of metal under a control that lets the load follow."""
     load = [{"boundary": "top", "value": 500.0}, BESIDE]
@@ -129,6 +135,10 @@ SOLID = {
     ],
 }
 ERRORS = {"errors": {"estimate": ["equilibrium", "integration", "directions"], "rule": "lebedev_11", "samples": 3}}
+ROUTINE = {
+    **{"model": "umat", "library": "mohr_coulomb.so", "unit_weight": 16.0},
+    **{"properties": [2e4, 0.25, 2.0, 30.0, 5.0], "state_variables": 1},
+}
 OTHER = {"stiff": ELASTIC | {"zones": []}}
 CHANGED = pushed(0.01, name="again", change=[{"zones": "all", "material": "stiff"}])
 SUPERLU = {"solver": {"linear": "superlu"}}
@@ -151,6 +161,8 @@ SCENES = {
         {"kind": "displacement", "terms": [{"boundary": "top", "component": "y"}], "change": -0.03}
     ),
     "solid": scene(METAL, **SOLID),
+    "rigid_body": pressed_by_a_body(),
+    "compiled_umat": scene(ROUTINE, pushed()),
     "axisymmetric": scene(MOHR, **AXISYMMETRIC),
     "axisymmetric_torsion": scene(SAND | LEVEL, **TORSION),
     "hollow_cylinder": scene(SAND | LEVEL, **HOLLOW, **ERRORS),

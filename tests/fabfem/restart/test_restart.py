@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 from restart_kills import content, killed
-from restart_scenes import CYCLES, ELASTIC, ELEMENTS, GROUND, MOHR, SCENES, pushed, scene
+from restart_scenes import CYCLES, ELASTIC, ELEMENTS, GROUND, MOHR, ROUTINE, SCENES, pushed, scene
 
 from fabfem.case import CaseError, read_case
 from fabfem.case.toml import write_toml
@@ -15,11 +15,14 @@ from fabfem.cli import main
 from fabfem.output.checkpoints import PATTERN, newest
 from fabfem.restart import Restart
 from fabfem.run import run_case
+from tests.umat.compiled import compiled
 
 
 def written(folder: Path, tables: dict[str, Any], name: str = "case.toml") -> Path:
     path = folder / name
     path.write_text(write_toml(tables), encoding="utf-8")
+    if tables["material"] == {"soil": ROUTINE}:
+        compiled("mohr_coulomb.c", folder)
     return path
 
 
