@@ -175,7 +175,7 @@ def test_a_run_says_the_error_class_that_the_study_of_its_case_found(
     assert 5e-4 < float(own["error"]) < 1e-3
     assert main(["solve", str(tube), "--out", out]) == DONE
     assert (
-        "\n  error     up to 0.1 % of u_a (its study: 0.083 %; size 0.083 %, increment 0 %); size 0.0625: 0.000"
+        "\n  error     up to 0.1 % of u_a (its study: 0.083 %; size 0.083 %, increment 0 %); size 0.0625: "
         in capsys.readouterr().out
     )
     tube.write_text(text.replace("size = 0.5", "size = 0.25"), encoding="utf-8")
