@@ -1,8 +1,14 @@
 """Whether several processes that share a scene find what one finds: the first table of docs/parallel.md.
 
-``python tests/benchmarks/ranks.py [SCENE ...]`` runs the shipped scenes, each for its first increments, alone and on 1,
-2 and 3 ranks of ``mpiexec``, and prints a row for each. A difference is the largest over all rows of a column, over
-the largest value of the columns with that unit: a force that is zero by symmetry is round-off of the others.
+``python tests/benchmarks/ranks.py [SCENE ...] [--increments N] [--minutes M]`` runs the shipped scenes to their end, or
+for their first increments, alone and on 1, 2 and 3 ranks of ``mpiexec``, one run at a time, and prints a row for each.
+Runs that are in `results/ranks` already are not repeated, so it goes on where it was stopped; ``--minutes 0`` runs
+nothing and prints the table of what is there. A run that takes longer than ``--minutes`` is ended and compared as far as
+it came.
+
+A difference is the largest over all rows of a column, over the largest value of the columns with that unit: a force
+that is zero by symmetry is round-off of the others. Where it passes 10⁻⁸ the first such row is named. `superlu` is the
+run of one process with SuperLU in place of PARDISO: what the scene makes of another round-off, without any ranks.
 """
 
 import argparse
@@ -26,13 +32,14 @@ SCENES = [
     *("slope/griffiths_lane_1", "slope/toyoura_bedding", "slope/toyoura_crest_load"),
     *("studies/lame", "studies/strip_von_mises"),
 ]
-LEFT_OUT = ("errors", "study", "sweep")
-"""Tables that a shared run does not take: the mesh's error needs the whole mesh."""
+LIMIT = 1e-8
+"""Difference that is asked for."""
+ALONE, OTHER = "alone", "superlu"
 QUIET = {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1", "OMPI_MCA_mpi_yield_when_idle": "1"}
 QUIET |= {"OMPI_MCA_rmaps_base_oversubscribe": "1", "OMPI_MCA_hwloc_base_binding_policy": "none"}
 
 
-def run(case: Path, folder: Path, increments: int | None) -> int:
+def run(case: Path, folder: Path, increments: int | None, linear: str) -> int:
     """Run the first increments of a scene in this process, or as one of several; return an exit status."""
     sys.path.insert(0, str(HOME))
     import fabfem.boundary_value.run as boundary_value
@@ -43,85 +50,124 @@ def run(case: Path, folder: Path, increments: int | None) -> int:
     march = boundary_value.march
     if increments:
         boundary_value.march = lambda model, start=None: islice(march(model, start), increments)
-    tables = {name: table for name, table in read_tables(case).items() if name not in LEFT_OUT}
+    tables = read_tables(case)
+    if linear:
+        tables["solver"] = {**tables.get("solver", {}), "linear": linear}
     with ended_together(traceback=True):
         outcome = run_case(case_from(tables, case), folder, quiet=True)
     return 0 if outcome.status in ("completed", "stopped") else 1
 
 
-def begun(ranks: int, case: Path, folder: Path, increments: int | None) -> subprocess.CompletedProcess[str]:
-    """Run a scene in processes of their own; none of MPI where `ranks` is 0."""
-    launcher = ["mpiexec", "-n", str(ranks)] if ranks else []
-    words = [sys.executable, __file__, "--run", str(case), str(folder), "--increments", str(increments or 0)]
-    return subprocess.run([*launcher, *words], env=os.environ | QUIET, capture_output=True, text=True, check=False)
+def begun(name: str, case: Path, folder: Path, said: argparse.Namespace) -> str:
+    """Run a scene in processes of their own, for some time at most; return why there is no result, or nothing."""
+    folder.mkdir(parents=True, exist_ok=True)
+    launcher = ["mpiexec", "-n", name] if name.isdigit() else []
+    words = [sys.executable, __file__, "--run", str(case), str(folder), "--increments", str(said.increments)]
+    words += ["--linear", name] if name == OTHER else []
+    before = os.times()
+    with (folder / "said").open("w", encoding="utf-8") as log:
+        process = subprocess.Popen([*launcher, *words], env=os.environ | QUIET, stdout=log, stderr=log)
+        try:
+            status: int | None = process.wait(60.0 * said.minutes)
+        except subprocess.TimeoutExpired:
+            process.terminate()
+            process.wait()
+            status = None
+    after, told = os.times(), (folder / "said").read_text(encoding="utf-8")
+    spent = after.children_user + after.children_system - before.children_user - before.children_system
+    lines = [line for line in told.splitlines() if "fabfem:" in line or "Error" in line]
+    why = (lines or [f"status {status}"])[0] if status else ""
+    ended = {"whole": status == 0 and not said.increments, "why": why, "processor": round(spent, 1)}
+    (folder / "ended.json").write_text(json.dumps(ended), encoding="utf-8")
+    return why
 
 
 def rows(folder: Path) -> tuple[list[str], list[list[str]]]:
-    """Return the header and the rows of a history."""
+    """Return the header and the rows of a history, whole ones only."""
     with (folder / "history.csv").open(encoding="utf-8") as file:
         header, *lines = csv.reader(file)
-    return header, lines
+    return header, [line for line in lines if len(line) == len(header)]
 
 
-def difference(one: Path, other: Path) -> float:
-    """Return the largest difference of two histories, infinite where they have other rows."""
+def differences(one: Path, other: Path) -> np.ndarray:
+    """Return the largest difference of two histories, row by row; infinite where they are not of the same stages."""
     (header, a), (again, b) = rows(one), rows(other)
-    if header != again or len(a) != len(b) or [row[0] for row in a] != [row[0] for row in b]:
-        return np.inf
-    one_, other_ = (np.array([[float(value or "nan") for value in row[1:]] for row in table]) for table in (a, b))
+    n = min(len(a), len(b))
+    stages = [[row[0] for row in table[:n]] for table in (a, b)]
+    if header != again or stages[0] != stages[1]:
+        return np.full(max(n, 1), np.inf)
+    one_, other_ = (np.array([[float(value or "nan") for value in row[1:]] for row in table[:n]]) for table in (a, b))
     units = [name.partition("[")[2] for name in header[1:]]
-    found = 0.0
+    found = np.zeros(n)
     for unit in set(units):
         columns = [place for place, own in enumerate(units) if own == unit]
-        gap = np.nan_to_num(np.abs(one_[:, columns] - other_[:, columns])).max()
-        found = max(found, gap / max(np.nanmax(np.abs(one_[:, columns])), 1e-300))
-    return float(found)
-
-
-def compared(scene: str, numbers: list[int], increments: int | None) -> dict[str, object]:
-    """Return the row of a scene: what was run, how far each number of ranks is from one process, and the imbalance."""
-    case = Path(scene) if scene.endswith(".toml") else HOME / "cases" / f"{scene}.toml"
-    found: dict[str, object] = {"scene": scene}
-    with tempfile.TemporaryDirectory() as home:
-        for ranks in (0, *numbers):
-            folder = Path(home) / str(ranks)
-            done = begun(ranks, case, folder, increments)
-            if done.returncode:
-                lines = [
-                    line for line in (done.stderr + done.stdout).splitlines() if "fabfem:" in line or "Error" in line
-                ]
-                found[f"{ranks} ranks"] = lines[0] if lines else f"status {done.returncode}"
-                continue
-            report = json.loads((folder / "report.json").read_text(encoding="utf-8"))
-            if ranks == 0:
-                found |= {"rows": len(rows(folder)[1]), "status": report["status"]}
-                continue
-            found[f"{ranks} ranks"] = difference(Path(home) / "0", folder)
-            found[f"imbalance on {ranks}"] = report["ranks"]["imbalance"].get("elements")
+        gap = np.nan_to_num(np.abs(one_[:, columns] - other_[:, columns])).max(axis=1)
+        found = np.maximum(found, gap / max(np.nanmax(np.abs(one_[:, columns]), initial=0.0), 1e-300))
     return found
 
 
-def table(row: dict[str, object], numbers: list[int]) -> str:
+def compared(scene: str, said: argparse.Namespace) -> dict[str, object]:
+    """Return the row of a scene: what was run, how far each run is from one process, and the imbalance."""
+    case = Path(scene) if scene.endswith(".toml") else HOME / "cases" / f"{scene}.toml"
+    home = said.folder / (case.stem if scene.endswith(".toml") else scene)
+    found: dict[str, object] = {"scene": scene}
+    for name in (ALONE, *said.runs):
+        folder = home / name
+        if said.minutes and not (folder / "ended.json").exists():
+            begun(name, case, folder, said)
+        if not (folder / "ended.json").exists():
+            continue
+        ended = json.loads((folder / "ended.json").read_text(encoding="utf-8"))
+        found[f"processor of {name}"] = ended["processor"]
+        if ended["why"]:
+            found[name] = ended["why"]
+        elif name == ALONE:
+            found |= {"rows": len(rows(folder)[1]), "whole": ended["whole"]}
+        else:
+            found[name] = told(home / ALONE, folder, ended["whole"])
+        if name.isdigit() and ended["whole"]:
+            report = json.loads((folder / "report.json").read_text(encoding="utf-8"))
+            found[f"imbalance on {name}"] = report["ranks"]["imbalance"].get("elements")
+    return found
+
+
+def told(one: Path, other: Path, whole: bool) -> str:
+    """Return the difference of two runs, from which row on it is too large, and how far one of them came."""
+    gaps, n = differences(one, other), len(rows(one)[1])
+    words = [f"{gaps.max(initial=0.0):.0e}"]
+    words += [f"above 1e-8 from {np.flatnonzero(gaps > LIMIT)[0] + 1}"] if (gaps > LIMIT).any() else []
+    m = len(rows(other)[1])
+    words += [f"{m} rows"] if m != n else []
+    words += ["not to its end"] if not whole else []
+    return ", ".join(words)
+
+
+def table(row: dict[str, object], said: argparse.Namespace) -> str:
     """Return a row as the document has it."""
-    shown = [row["scene"], row.get("rows"), *(row.get(f"{n} ranks") for n in numbers)]
-    shown += [", ".join(str(row[f"imbalance on {n}"]) for n in numbers if n > 1 and f"imbalance on {n}" in row)]
-    return "| " + " | ".join(f"{part:.0e}" if isinstance(part, float) else str(part) for part in shown) + " |"
+    rows_ = row.get("rows", row.get(ALONE))
+    shown = [f"`{row['scene']}`", f"{'all ' if row.get('whole') else ''}{rows_}", *(row.get(n, "") for n in said.runs)]
+    shown += [", ".join(str(row[f"imbalance on {n}"]) for n in said.runs if n != "1" and f"imbalance on {n}" in row)]
+    shown += [", ".join(str(row.get(f"processor of {n}", "")) for n in (ALONE, *said.runs))]
+    return "| " + " | ".join(map(str, shown)) + " |"
 
 
 def main() -> int:
     """Run what the command line says."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("scenes", nargs="*", default=SCENES)
-    parser.add_argument("--ranks", type=int, nargs="+", default=[1, 2, 3])
-    parser.add_argument("--increments", type=int, default=8)
+    parser.add_argument("--runs", nargs="+", default=["1", "2", "3", OTHER], help="numbers of ranks, or superlu")
+    parser.add_argument("--increments", type=int, default=0, help="the first increments alone")
+    parser.add_argument("--minutes", type=float, default=15.0, help="limit of each run")
+    parser.add_argument("--folder", type=Path, default=HOME / "results" / "ranks")
     parser.add_argument("--json", action="store_true")
+    parser.add_argument("--linear", default="", help=argparse.SUPPRESS)
     parser.add_argument("--run", nargs=2, type=Path, metavar=("CASE", "FOLDER"), help=argparse.SUPPRESS)
     said = parser.parse_args()
     if said.run:
-        return run(*said.run, said.increments)
+        return run(*said.run, said.increments, said.linear)
     for scene in said.scenes:
-        row = compared(scene, said.ranks, said.increments)
-        print(json.dumps(row) if said.json else table(row, said.ranks), flush=True)
+        row = compared(scene, said)
+        print(json.dumps(row) if said.json else table(row, said), flush=True)
     return 0
 
 
