@@ -16,13 +16,13 @@ from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
-from scipy.sparse import csr_matrix
 
 import umat
 from fabfem.boundary_value.probes import Column, Keeper, Value
 from fabfem.case import BoundaryValueCase, CaseError
 from fabfem.fem.model import Model, Zone, elastic_tangents
-from fabfem.fem.recovery import energy_density, fine_space, nearest, recovery, stress_within
+from fabfem.fem.recovery import energy_density, fine_space, nearest, recovered, stress_within
+from fabfem.fem.share import mapped
 from fabfem.fem.solve import Increment
 from fabfem.substance import Substance
 from umat.mandel import Array, norm
@@ -39,11 +39,9 @@ class Discretisation:
         self.fine = fine_space(model.space)
 
     @cached_property
-    def operator(self) -> csr_matrix:
-        """Matrix that recovers the stress at the fine points."""
-        nq = self.model.space.nq
-        zones = [_ids(zone, self.model)[::nq] // nq for zone in self.model.zones.values()]
-        return recovery(self.model.space, self.fine, zones)
+    def recovered(self) -> Callable[[Array], Array]:
+        """What recovers the stress at the fine points."""
+        return recovered(self.model.space, self.fine, self.model.zones)
 
     def energies(self, increment: Increment) -> tuple[Array, Array]:
         """Return the (nel,) energies of the error and of the stress."""
@@ -53,7 +51,7 @@ class Discretisation:
         elastic = points[:, nearest(space, self.fine)].reshape(-1, 6, 6)
         within = stress_within(space, self.fine, stress, increment.tangent, increment.displacement)
         weights = self.fine.weights
-        parts = (energy_density(part, elastic) * weights for part in (self.operator @ stress - within, within))
+        parts = (energy_density(part, elastic) * weights for part in (self.recovered(stress) - within, within))
         error, energy = (part.reshape(-1, self.fine.nq).sum(axis=1) for part in parts)
         return error, energy
 
@@ -61,13 +59,14 @@ class Discretisation:
         """Return the (npoints,) root of the error's energy density in the element over the mean energy density."""
         error, energy = self.energies(increment)
         volume = self.fine.weights.reshape(-1, self.fine.nq).sum(axis=1)
-        mean = energy.sum() / volume.sum()
+        total = self.model.space.mesh.ranks.sum
+        mean = total(float(energy.sum())) / total(float(volume.sum()))
         found = np.sqrt(error / volume / mean) if mean > 0.0 else np.zeros_like(error)
         return np.repeat(found, self.model.space.nq)
 
     def value(self, increment: Increment) -> float:
         """Return the norm of the error over that of the recovered stress, both in energy."""
-        error, energy = (float(part.sum()) for part in self.energies(increment))
+        error, energy = (self.model.space.mesh.ranks.sum(float(part.sum())) for part in self.energies(increment))
         return float(np.sqrt(error / (energy + error))) if energy > 0.0 else 0.0
 
 
@@ -101,51 +100,69 @@ class _Sampled(NamedTuple):
 
     zone: Zone
     second: Substance
-    ids: Array
+    ids: np.ndarray
     """Numbers of the points in the space."""
-    within: Array
+    within: np.ndarray
     """Their numbers in the zone."""
+    places: np.ndarray
+    """Which of the samples of all ranks they are."""
 
 
 class Directions:
     """The error of the set of contact directions."""
 
     def __init__(self, model: Model, seconds: Mapping[str, Substance], samples: int) -> None:
-        self.model = model
+        self.model, self.ranks = model, model.space.mesh.ranks
         self.sampled = {name: _sampled(zone, seconds[name], model, samples) for name, zone in _spread(model, seconds)}
         self.states = {name: _started(sampled) for name, sampled in self.sampled.items()}
         self.alive = {name: np.ones(len(sampled.ids), bool) for name, sampled in self.sampled.items()}
-        self._last: tuple[int, Array] | None = None
+        self.strains = {name: np.zeros((len(sampled.ids), 6)) for name, sampled in self.sampled.items()}
+        self._stage = 0
 
     def value(self, increment: Increment) -> Value:
         """Return the distance of the stresses by the two rules; nothing where the second refused all points."""
-        strain = self.model.space.strain(increment.displacement - self._before(increment))
-        self._last = increment.stage_index, increment.displacement
+        if increment.stage_index != self._stage and self.model.stages[self._stage].zero_displacement:
+            self.strains = {name: np.zeros_like(strain) for name, strain in self.strains.items()}
+        self._stage = increment.stage_index
+        strain = self.model.space.strain(increment.displacement)
         followed = [self._follow(name, strain, increment) for name in self.sampled]
         gaps, stress = (np.concatenate(part) for part in zip(*followed, strict=True))
-        return float(np.sqrt(np.sum(gaps**2) / np.sum(stress**2))) if stress.any() else ""
-
-    def _before(self, increment: Increment) -> Array:
-        """Return the displacement from which an increment set out."""
-        if self._last is None:
-            return np.zeros(self.model.space.ndof)
-        stage_index, displacement = self._last
-        moved_on = stage_index != increment.stage_index
-        return displacement * (not (moved_on and self.model.stages[stage_index].zero_displacement))
+        gap, size = self.ranks.sum(float(np.sum(gaps**2))), self.ranks.sum(float(np.sum(stress**2)))
+        return float(np.sqrt(gap / size)) if size > 0.0 else ""
 
     def memory(self) -> Any:
-        """Return the states of the samples, which of them are still followed, and the last increment."""
-        return self.states, self.alive, self._last
+        """Return the states of the samples, which of them are still followed, their strains, and the last stage."""
+        return *(self._of_all(part) for part in (self.states, self.alive, self.strains)), self._stage
 
     def recall(self, memory: Any) -> None:
-        """Go on from what an earlier run had gathered."""
-        self.states, self.alive, self._last = memory
+        """Go on from what an earlier run had gathered, by as many ranks as it had."""
+        *parts, self._stage = memory
+        self.states, self.alive, self.strains = (self._of_own(part) for part in parts)
+
+    def _of_all(self, by_zone: Mapping[str, Any]) -> dict[str, Any]:
+        """Return what is known of the samples of this rank, of those of all."""
+        return {name: mapped(value, f"zone:{name}", self._gathered) for name, value in by_zone.items()}
+
+    def _of_own(self, by_zone: Mapping[str, Any]) -> dict[str, Any]:
+        """Return what is known of the samples of all ranks, of those of this one."""
+        return {name: mapped(value, f"zone:{name}", self._picked) for name, value in by_zone.items()}
+
+    def _gathered(self, kind: str, array: Array) -> Array:
+        order = np.argsort(self.ranks.stacked(self._places(kind)))
+        return self.ranks.stacked(array)[order]
+
+    def _picked(self, kind: str, array: Array) -> Array:
+        return array[self._places(kind)]
+
+    def _places(self, kind: str) -> np.ndarray:
+        return self.sampled[kind.removeprefix("zone:")].places
 
     def _follow(self, name: str, strain: Array, increment: Increment) -> tuple[Array, Array]:
         """Lead the samples of a zone on; return the distance of the stresses and the size of the first."""
         sampled, old, alive = self.sampled[name], self.states[name], self.alive[name]
-        response = umat.update(sampled.second.material, sampled.second.directions, strain[sampled.ids], old)
-        self.states[name] = response.state
+        now = strain[sampled.ids]
+        response = umat.update(sampled.second.material, sampled.second.directions, now - self.strains[name], old)
+        self.states[name], self.strains[name] = response.state, now
         alive &= response.status == OK
         first = increment.states[name].stress[sampled.within]
         return norm(first - response.stress)[alive], norm(first)[alive]
@@ -173,9 +190,6 @@ def error_columns(
     said = case.errors
     if said is None:
         return (), None
-    apart = [name for name in said.estimate if name in ("discretisation", "directions")]
-    if apart and model.space.mesh.ranks.size > 1:
-        raise CaseError(f"{case.path.name}: errors.estimate: '{apart[0]}' is estimated where one process has the mesh")
     mesh = Discretisation(model)
     makers: dict[str, Callable[[], tuple[Callable[[Increment], Value], Keeper | None]]] = {
         "equilibrium": lambda: (lambda increment: increment.residuals[-1] + increment.drag, None),
@@ -217,12 +231,18 @@ def _spread(model: Model, seconds: Mapping[str, Substance]) -> list[tuple[str, Z
 
 
 def _sampled(zone: Zone, second: Substance, model: Model, samples: int) -> _Sampled:
-    """Return points of a zone that stand for equal parts of its volume."""
-    ids = _ids(zone, model)
-    volume = np.cumsum(model.space.weights[ids])
-    parts = min(samples, len(ids))
-    within = np.unique(np.searchsorted(volume, volume[-1] * (np.arange(parts) + 0.5) / parts))
-    return _Sampled(zone, second, ids[within], within)
+    """Return this rank's of the points of a zone that stand for equal parts of its volume."""
+    ids, ranks = _ids(zone, model), model.space.mesh.ranks
+    elements = ranks.numbers(len(model.space.mesh.cells), len(model.space.mesh.points))[0]
+    nq = model.space.nq
+    number = elements[ids // nq] * nq + ids % nq
+    every = ranks.stacked(number)
+    order = np.argsort(every)
+    volume = np.cumsum(ranks.stacked(model.space.weights[ids])[order])
+    parts = min(samples, len(every))
+    chosen = every[order][np.unique(np.searchsorted(volume, volume[-1] * (np.arange(parts) + 0.5) / parts))]
+    within = np.flatnonzero(np.isin(number, chosen))
+    return _Sampled(zone, second, ids[within], within, np.searchsorted(chosen, number[within]))
 
 
 def _started(sampled: _Sampled) -> Any:

@@ -11,9 +11,21 @@ interface of `Alone`. Space, assembly, batch update and Newton are those of one 
 With one process all of this is the identity.
 """
 
-from typing import Any
+from collections.abc import Callable
+from typing import Any, NamedTuple
 
 import numpy as np
+
+
+class Around(NamedTuple):
+    """A rank's elements with those of other ranks around them."""
+
+    mesh: Any
+    """The rank's elements first; without boundaries, and alone."""
+    values: Callable[[np.ndarray], np.ndarray]
+    """Values (n, ...) of the rank's elements -> those of all elements of `mesh`; called by all ranks together."""
+    inner: int
+    """Elements of `mesh` before those of the outermost layer."""
 
 
 class Alone:
@@ -89,6 +101,10 @@ class Alone:
     def nearest(self, distance: np.ndarray) -> np.ndarray:
         """The node of the least distance, the first in the whole mesh; empty on a rank that does not have it."""
         return np.array([distance.argmin()])
+
+    def around(self, mesh: Any, layers: int) -> Around:
+        """A rank's mesh with some layers of the others' elements around it; one process has no others."""
+        return Around(mesh, lambda values: values, len(mesh.cells))
 
     def solver(self, constraints: Any, space: Any) -> Any:
         """A linear solver for the unknowns of a stage; None for those of one process."""

@@ -6,19 +6,25 @@ that is closer to the truth than the one they come from. Their difference in the
 ‖e‖² = ∫ (σ* − σ) : D⁻¹ : (σ* − σ) dV, estimates the error; D is the elastic tangent. A zone is recovered from its own
 points, for the stress may jump between materials. At nodes in the middle of edges and faces the fits of their corners
 are averaged; a patch with few points, as at a boundary, takes its neighbours' too.
+
+Where several ranks share the mesh, a patch draws on the elements of other ranks, in as many layers as it takes.
 """
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
+from dataclasses import replace
 from itertools import combinations_with_replacement
 
 import numpy as np
 from scipy.sparse import csr_matrix
 
 from fabfem.fem.elements import ELEMENTS, shape
+from fabfem.fem.kinematics import Kinematics
 from fabfem.fem.space import Space, build_space
 
 ENOUGH = 2
 """Points of a patch for each coefficient of the polynomial."""
+LAYERS = 2
+"""Layers of other ranks' elements that are asked for first: a patch at a border seldom draws on more than one."""
 SLIGHT = 1e-3
 """Singular value below which points do not determine a coefficient, over the root of their number."""
 
@@ -60,19 +66,40 @@ def _spread(fit: np.ndarray, values: np.ndarray, space: Space) -> np.ndarray:
     return np.einsum("fq,eqk->efk", fit, values.reshape(-1, space.nq, 6)).reshape(-1, 6)
 
 
+def recovered(space: Space, fine: Space, zones: Iterable[str]) -> Callable[[np.ndarray], np.ndarray]:
+    """Return the function from the stress at the points (npoints, 6) to that recovered at the n fine points (n, 6).
+
+    All ranks call it together, once each with the stress of their own points.
+    """
+    ranks, layers, names = space.mesh.ranks, LAYERS, list(zones)
+    while True:
+        mesh, values, inner = ranks.around(space.mesh, layers)
+        wider = space if mesh is space.mesh else build_space(mesh, _plain(space), space.nq)
+        matrix = recovery(wider, fine, [mesh.zone(name) for name in names])
+        # a patch that reaches the outermost layer may lack what lies beyond
+        if not ranks.largest(int(matrix.indices.max(initial=-1) >= inner * space.nq)):
+            return lambda stress: matrix @ values(stress.reshape(-1, space.nq, 6)).reshape(-1, 6)
+        layers += 1
+
+
+def _plain(space: Space) -> Kinematics:
+    """Return the kinematics without means over patches, which a recovery does not need."""
+    return replace(space.kinematics, mean_dilation=False)
+
+
 def recovery(space: Space, fine: Space, zones: Iterable[np.ndarray]) -> csr_matrix:
     """Return the (n, npoints) matrix from the stress at the points to the recovered one at the n fine points.
 
     Parameters
     ----------
     space, fine : Space
-        Where the stress is known, and where it is wanted.
+        Where the stress is known, and where it is wanted: on the same elements or the first of them.
     zones : iterable of int arrays
         Elements of each zone; together all elements.
     """
-    rows, columns, values = [], [], []
+    rows, columns, values = [np.zeros(0, int)], [np.zeros(0, int)], [np.zeros(0)]
     for elements in zones:
-        for element, (points, matrix) in _at_nodes(space, elements).items():
+        for element, (points, matrix) in _at_nodes(space, elements, len(fine.mesh.cells)).items():
             rows.append(np.repeat(element * fine.nq + np.arange(fine.nq), len(points)))
             columns.append(np.tile(points, fine.nq))
             values.append((fine.values @ matrix).ravel())
@@ -85,34 +112,39 @@ def energy_density(stress: np.ndarray, tangent: np.ndarray) -> np.ndarray:
     return np.einsum("ni,ni->n", stress, np.linalg.solve(tangent, stress[..., None])[..., 0])
 
 
-def _at_nodes(space: Space, elements: np.ndarray) -> dict[int, tuple[np.ndarray, np.ndarray]]:
-    """Return for each element the points it draws on and the (nnode, npoint) matrix from them to its nodes."""
-    fits = _fits(space, elements)
+def _at_nodes(space: Space, elements: np.ndarray, nel: int) -> dict[int, tuple[np.ndarray, np.ndarray]]:
+    """Return for each of the first `nel` elements its points and the (nnode, npoint) matrix from them to its nodes."""
+    own = elements[elements < nel]
+    fits = _fits(space, elements, own)
     corners = space.mesh.cells[:, : len(space.mesh.element.corners)]
     parents = [*((i,) for i in range(corners.shape[1])), *space.mesh.element.midside]
     found = {}
-    for element in elements:
-        own = [fits[corner] for corner in corners[element]]
-        points = np.unique(np.concatenate([fit[0] for fit in own]))
+    for element in own:
+        some_fits = [fits[corner] for corner in corners[element]]
+        points = np.unique(np.concatenate([fit[0] for fit in some_fits]))
         matrix = np.zeros((len(parents), len(points)))
         nodes = space.mesh.points[space.mesh.cells[element]]
         for node, some in enumerate(parents):
             for corner in some:
-                chosen, origin, size, inverse = own[corner]
+                chosen, origin, size, inverse = some_fits[corner]
                 row = monomials((nodes[node] - origin) / size, _degree(space)) @ inverse
                 matrix[node, np.searchsorted(points, chosen)] += row / len(some)
         found[int(element)] = points, matrix
     return found
 
 
-def _fits(space: Space, elements: np.ndarray) -> dict[int, tuple[np.ndarray, np.ndarray, float, np.ndarray]]:
-    """Return for each corner node its points, origin and size, and the matrix from points to coefficients."""
-    corners = space.mesh.cells[elements][:, : len(space.mesh.element.corners)]
+def _fits(
+    space: Space, elements: np.ndarray, own: np.ndarray
+) -> dict[int, tuple[np.ndarray, np.ndarray, float, np.ndarray]]:
+    """Return for each corner of `own` its points, origin and size, and the matrix from points to coefficients."""
+    ncorner = len(space.mesh.element.corners)
+    corners = space.mesh.cells[elements, :ncorner]
     around: dict[int, list[int]] = {}
     for element, nodes in zip(elements.tolist(), corners.tolist(), strict=True):
         for node in nodes:
             around.setdefault(node, []).append(element)
-    return {node: _fit(space, node, _patch(space, some, around)) for node, some in around.items()}
+    wanted = np.unique(space.mesh.cells[own, :ncorner]).tolist()
+    return {node: _fit(space, node, _patch(space, around[node], around)) for node in wanted}
 
 
 def _patch(space: Space, elements: list[int], around: dict[int, list[int]]) -> list[int]:

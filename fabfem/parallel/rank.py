@@ -11,10 +11,12 @@ import numpy as np
 from mpi4py import MPI
 from petsc4py import PETSc
 
+from fabfem.fem.mesh import Mesh
 from fabfem.fem.model import Refusal
-from fabfem.fem.ranks import Alone
+from fabfem.fem.ranks import Alone, Around
 from fabfem.fem.space import Space
 from fabfem.fem.supports import Constraints
+from fabfem.parallel.halo import around
 from fabfem.parallel.solver import PetscSolver, Settings
 
 
@@ -127,6 +129,10 @@ class Rank(Alone):
         least = self.least(float(distance.min()))  # the same number at a node on all ranks that have it
         number = int(self.part.nodes[distance == least].min(initial=np.iinfo(np.int64).max))
         return np.flatnonzero(self.part.nodes == self.least(number))
+
+    def around(self, mesh: Mesh, layers: int) -> Around:
+        """A rank's mesh with some layers of the others' elements around it."""
+        return around(self.comm, mesh, self.part.elements, self.part.nodes, layers)
 
     def solver(self, constraints: Constraints, space: Space) -> PetscSolver:
         """A linear solver for the unknowns of a stage."""

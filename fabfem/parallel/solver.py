@@ -19,7 +19,7 @@ from mpi4py import MPI
 from petsc4py import PETSc
 from scipy.sparse import csr_matrix
 
-from fabfem.fem.linear import OVERFLOW, POOR, USELESS, Solution
+from fabfem.fem.linear import OVERFLOW, POOR, REFINEMENTS, USELESS, Solution
 from fabfem.fem.pores import PorousSpace
 from fabfem.fem.space import Space
 from fabfem.fem.supports import Constraints
@@ -94,9 +94,8 @@ class PetscSolver:
             return
         _release_others(self)
         self._matrix = self._rows.matrix(matrix, self._matrix)
-        if self._ksp is None:
-            self._ksp = self._made(self._settings.multigrid)
-        self._ksp.setOperators(self._matrix)
+        if self._ksp is not None:
+            self._ksp.setOperators(self._matrix)
 
     def solve(self, rhs: np.ndarray) -> Solution:
         """Solve with the last matrix."""
@@ -132,7 +131,9 @@ class PetscSolver:
 
     def _solved(self, b: PETSc.Vec, size: float, wanted: float) -> tuple[PETSc.Vec, float]:
         """Return the solution and its relative residual: of the iteration, else refined once by a direct solver."""
-        assert self._ksp is not None
+        if self._ksp is None:
+            self._ksp = self._made(self._settings.multigrid)
+            self._ksp.setOperators(self._matrix)
         if self._settings.multigrid:
             self._ksp.setTolerances(rtol=0.5 * wanted, atol=0.0)
             x, residual = self._tried(self._ksp, b, size)
@@ -148,12 +149,15 @@ class PetscSolver:
 
     def _refined(self, ksp: PETSc.KSP, b: PETSc.Vec, size: float) -> tuple[PETSc.Vec, float]:
         x, residual = self._tried(ksp, b, size)
-        if POOR < residual < np.inf:
-            again, _ = self._tried(ksp, self._left(x, b), size)
+        for _ in range(REFINEMENTS):
+            if not POOR < residual < np.inf:
+                break
+            again = self._tried(ksp, self._left(x, b), size)[0]
             again.axpy(1.0, x)
             better = self._left(again, b).norm() / size
-            if better < residual:
-                return again, better
+            if not better < residual:
+                break
+            x, residual = again, float(better)
         return x, residual
 
     def _tried(self, ksp: PETSc.KSP, b: PETSc.Vec, size: float) -> tuple[PETSc.Vec, float]:
@@ -162,10 +166,19 @@ class PetscSolver:
         try:
             ksp.solve(b, x)
         except PETSc.Error:
+            self._forget(ksp)
             return x, np.inf
         self._spent["linear_iterations"] += ksp.getIterationNumber()
+        if ksp.getConvergedReason() == PETSc.KSP.ConvergedReason.DIVERGED_PCSETUP_FAILED:
+            self._forget(ksp)
         residual = self._left(x, b).norm() / size
         return x, float(residual) if np.isfinite(residual) else np.inf
+
+    def _forget(self, ksp: Any) -> None:
+        """Let the next solve make a new solver: one that has broken off solves nothing more, whatever the matrix."""
+        if self._ksp is not None and ksp is self._ksp:
+            ksp.destroy()
+            self._ksp = None
 
     def _left(self, x: PETSc.Vec, b: PETSc.Vec) -> PETSc.Vec:
         assert self._matrix is not None

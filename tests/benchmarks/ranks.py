@@ -3,8 +3,8 @@
 ``python tests/benchmarks/ranks.py [SCENE ...] [--increments N] [--minutes M]`` runs the shipped scenes to their end, or
 for their first increments, alone and on 1, 2 and 3 ranks of ``mpiexec``, one run at a time, and prints a row for each.
 Runs that are in `results/ranks` already are not repeated, so it goes on where it was stopped; ``--minutes 0`` runs
-nothing and prints the table of what is there. A run that takes longer than ``--minutes`` is ended and compared as far as
-it came.
+nothing and prints the table of what is there. A run that takes longer than ``--minutes`` is ended and compared as far
+as it came.
 
 A difference is the largest over all rows of a column, over the largest value of the columns with that unit: a force
 that is zero by symmetry is round-off of the others. Where it passes 10⁻⁸ the first such row is named. `superlu` is the
@@ -17,7 +17,6 @@ import json
 import os
 import subprocess
 import sys
-import tempfile
 from itertools import islice
 from pathlib import Path
 

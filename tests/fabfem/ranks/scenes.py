@@ -153,7 +153,46 @@ tolerance = 0.1
     .replace("yield_stress = 17.320508", "yield_stress = 25.0")
 )
 """A bank that nothing holds on its right side, weakened until it fails."""
-SCENES = {"dry": DRY, "patches": PATCHES, "solid": SOLID, "wet": WET, "body": BODY, "arc": ARC, "weak": WEAK}
+SURE = (
+    FLAT.format(shape="quad", cells="4, 3", order=2)
+    + """
+[material.sand]
+model = "chang_hicher"
+preset = "toyoura"
+void_ratio = 0.7
+unit_weight = 15.0
+fabric = { norm = 0.2 }
+[errors]
+estimate = ["equilibrium", "integration", "discretisation", "directions"]
+rule = "lebedev_17"
+samples = 7
+[checkpoint]
+increments = 2
+[[stage]]
+name = "rest"
+kind = "geostatic"
+surcharge = 50.0
+pressure = [{ boundary = "top", value = 50.0 }]
+[[stage]]
+name = "push"
+kind = "load"
+traction = [{ boundary = "top", x = 12.0, y = -10.0 }]
+increments = { initial = 0.25, maximum = 0.25 }
+[output]
+fields = ["stress", "discretisation_error"]
+"""
+)
+"""Sand that says how wrong it is: patches and samples that do not care where the mesh is divided."""
+SCENES = {
+    "dry": DRY,
+    "sure": SURE,
+    "patches": PATCHES,
+    "solid": SOLID,
+    "wet": WET,
+    "body": BODY,
+    "arc": ARC,
+    "weak": WEAK,
+}
 SCENES |= {
     "multigrid": SOLID + '[solver]\nlinear = "multigrid"\ntolerance = 1e-8\n',
     "split": WET + '[solver]\nlinear = "multigrid"\ntolerance = 1e-8\n',

@@ -105,6 +105,57 @@ def test_the_report_tells_what_each_rank_had(shared: Path) -> None:
 
 
 @needs_mpi
+def test_the_field_of_the_error_does_not_show_where_the_mesh_is_divided(alone: Path, shared: Path) -> None:
+    import pyvista
+
+    whole, pieces = (pyvista.read(sorted((home / "sure").glob(name))[-1]) for home, name in (
+        (alone, "fields_*.vtu"), (shared, "fields_*.pvtu")
+    ))  # fmt: skip
+    order = [pieces.find_closest_cell(place) for place in whole.cell_centers().points]
+    one, other = (mesh.cell_data["discretisation_error"] for mesh in (whole, pieces))
+    assert one.max() > 0.0
+    np.testing.assert_allclose(other[order], one, rtol=1e-6)
+
+
+@needs_mpi
+def test_a_singular_matrix_does_not_spoil_the_solves_after_it(tmp_path: Path) -> None:
+    (tmp_path / "dry.toml").write_text(SCENES["dry"], encoding="utf-8")
+    program = tmp_path / "singular.py"
+    program.write_text(PROGRAM, encoding="utf-8")
+    done = started(2, program, tmp_path / "dry.toml")
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.split("\n")[:2] == ["[True, False, False, True]"] * 2, done.stdout
+
+
+PROGRAM = """
+import sys
+from pathlib import Path
+import numpy as np
+from fabfem.boundary_value.problem import build
+from fabfem.case import case_from, read_tables
+from fabfem.fem.assembly import stiffness
+from fabfem.fem.model import elastic_tangents
+from fabfem.fem.solve import systems_of
+
+path = Path(sys.argv[1])
+model = build(case_from(read_tables(path), path)).model
+system = systems_of(model)[1]
+tangent = elastic_tangents(model.zones, {name: zone.state for name, zone in model.zones.items()}, model.space.npoints)
+whole = system.reduce(stiffness(system.space, system.pattern, tangent))
+empty = whole.copy()
+empty.data[:] = 0.0
+solver = model.space.mesh.ranks.solver(system.constraints, system.space)
+found = []
+for matrix in (whole, empty, None, whole):
+    if matrix is not None:
+        solver.factor(matrix)
+    found.append(solver.solve(np.ones(whole.shape[0])).ok)
+print(found, flush=True)
+"""
+"""Solves with a good matrix, twice with one of zeros, and with the good one again."""
+
+
+@needs_mpi
 def test_the_pieces_are_opened_as_one(alone: Path, shared: Path) -> None:
     import pyvista
 
@@ -121,20 +172,22 @@ def test_the_pieces_are_opened_as_one(alone: Path, shared: Path) -> None:
 
 
 @needs_mpi
-@pytest.mark.parametrize(("first", "then"), [(2, 3), (2, 0), (0, 2)])
+@pytest.mark.parametrize(
+    ("name", "first", "then"), [("dry", 2, 3), ("dry", 2, 0), ("dry", 0, 2), ("sure", 2, 3), ("sure", 0, 2)]
+)
 def test_a_checkpoint_of_some_ranks_is_read_by_others(
-    first: int, then: int, alone: Path, shared: Path, tmp_path: Path
+    name: str, first: int, then: int, alone: Path, shared: Path, tmp_path: Path
 ) -> None:
-    shutil.copytree({0: alone, 2: shared}[first] / "dry", tmp_path / "dry")
-    last = sorted((tmp_path / "dry").glob("checkpoint_*.npz"))[-1]
+    shutil.copytree({0: alone, 2: shared}[first] / name, tmp_path / name)
+    last = sorted((tmp_path / name).glob("checkpoint_*.npz"))[-1]
     last.unlink()
-    kept = sorted((tmp_path / "dry").glob("checkpoint_*.npz"))
+    kept = sorted((tmp_path / name).glob("checkpoint_*.npz"))
     assert kept, "there is nothing to go on from"
-    report = tmp_path / "dry" / "report.json"
+    report = tmp_path / name / "report.json"
     report.unlink()
-    done = ran(tmp_path, then, ["dry"], "--resume")
+    done = ran(tmp_path, then, [name], "--resume")
     assert done.returncode == 0, done.stderr
-    assert max(apart(alone / "dry", tmp_path / "dry").values()) < 1e-8
+    assert max(apart(alone / name, tmp_path / name).values()) < 1e-8
     assert json.loads(report.read_text(encoding="utf-8"))["status"] == "completed"
 
 
@@ -171,7 +224,7 @@ def test_a_rank_that_fails_stops_all_with_its_reason(tmp_path: Path) -> None:
     [
         ('boundary = "top"', 'boundary = "topp"', "the mesh has no boundary 'topp'"),
         ("k0 = 0.6", "k0 = 0.6\n[solver]\nlinear = 'superlu'", "is a solver of one process"),
-        ("k0 = 0.6", "k0 = 0.6\n[errors]\nestimate = ['discretisation']", "one process has the mesh"),
+        ("k0 = 0.6", "k0 = 0.6\n[solver]\ndiagnose = true", "by one process with the whole mesh"),
         ('fix = ["x", "y"]', 'fix = ["x"]', "one rigid motion"),
     ],
 )
