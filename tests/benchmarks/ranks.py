@@ -19,6 +19,7 @@ import subprocess
 import sys
 from itertools import islice
 from pathlib import Path
+from shutil import rmtree
 
 import numpy as np
 
@@ -59,7 +60,8 @@ def run(case: Path, folder: Path, increments: int | None, linear: str) -> int:
 
 def begun(name: str, case: Path, folder: Path, said: argparse.Namespace) -> str:
     """Run a scene in processes of their own, for some time at most; return why there is no result, or nothing."""
-    folder.mkdir(parents=True, exist_ok=True)
+    rmtree(folder, ignore_errors=True)  # of a run that was cut short
+    folder.mkdir(parents=True)
     launcher = ["mpiexec", "-n", name] if name.isdigit() else []
     words = [sys.executable, __file__, "--run", str(case), str(folder), "--increments", str(said.increments)]
     words += ["--linear", name] if name == OTHER else []
