@@ -1,10 +1,12 @@
 """Strong and weak scaling of a three-dimensional footing on shared processes: the second table of docs/parallel.md.
 
-``python tests/benchmarks/ranks_scaling.py [--linear multigrid mumps] [--unknowns 50000 100000] [--ranks 1 2]
-[--material elastic]`` settles a square footing, a quarter of the scene, by a millimetre in two increments after the
-geostatic stage, and prints a row for each run: wall time by phase (the largest of a rank) and in all, memory by rank,
-linear iterations over solves, MiB sent by each rank, and imbalance. One number of unknowns with several numbers of
-ranks is strong scaling, numbers in proportion are weak scaling. The load of the machine stands in the last column.
+``python tests/benchmarks/ranks_scaling.py strong`` takes 50 000 unknowns on 1 and on 2 ranks, ``weak`` 50 000 on one and
+100 000 on two, ``states`` sand with 15 000 on 1 and on 2. Each settles a square footing, a quarter of the scene, by a
+millimetre in two increments after the geostatic stage, and prints a row for a run: time by phase (the largest of a
+rank) and in all, the processor time of all ranks together, memory by rank, points by rank, linear iterations over solves,
+MiB sent by each rank, and imbalance. The load of the machine before the run stands in the last column: the times are
+those of a free machine where it is below about 0.3. ``--unknowns``, ``--ranks``, ``--material`` and ``--linear`` change
+what is run.
 """
 
 import argparse
@@ -77,12 +79,30 @@ max_evaluations = 1000
 """What the ground is made of: with the elastic one, the cost is that of the equations alone."""
 
 
-def block(n: int) -> meshio.Mesh:
-    """Return 4n × 4n × 3n hexahedra of 2 m × 2 m × 1.5 m, the footing a quarter of the top."""
-    counts, size = np.array([4 * n, 4 * n, 3 * n]), 0.5 / n
-    axes = [np.arange(count + 1) * size for count in counts]
+RUNS = {
+    "strong": ((50000, 1), (50000, 2)),
+    "weak": ((50000, 1), (100000, 2)),
+    "states": ((15000, 1), (15000, 2)),
+}
+"""Unknowns and ranks of each run."""
+HEAD = (
+    *("solver", "material", "unknowns", "ranks", "material [s]", "assembly [s]", "linear solve [s]", "all [s]"),
+    *("processor [s]", "memory [MiB]", "points of each", "iterations / solves", "sent [MiB]", "imbalance", "load"),
+)
+
+
+def counts(unknowns: int) -> tuple[int, int, int]:
+    """Return the elements along each axis of a block of about so many unknowns, some 14 of them to an element."""
+    wide = 4 * max(1, round((unknowns / 10.5) ** (1 / 3) / 4))  # the footing ends at a quarter of the width
+    return wide, wide, max(2, round(unknowns / (14 * wide**2)))
+
+
+def block(counts: tuple[int, int, int]) -> meshio.Mesh:
+    """Return hexahedra of 2 m × 2 m × 1.5 m, the footing a quarter of the top's width."""
+    sizes = (2.0, 2.0, 1.5)
+    axes = [np.linspace(0.0, size, count + 1) for size, count in zip(sizes, counts, strict=True)]
     points = np.stack(np.meshgrid(*axes, indexing="ij"), -1).reshape(-1, 3) - [0.0, 0.0, 1.5]
-    number = np.arange(len(points)).reshape(counts + 1)
+    number = np.arange(len(points)).reshape(np.array(counts) + 1)
     shift = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (1, 1, 1), (0, 1, 1)]
     a, b, c = counts
     cells = np.stack([number[i : i + a, j : j + b, k : k + c].ravel() for i, j, k in shift], axis=1)
@@ -95,35 +115,33 @@ def block(n: int) -> meshio.Mesh:
     return meshio.Mesh(points, [("hexahedron", cells)], point_sets=sets)
 
 
-def fineness(unknowns: int) -> int:
-    """Return the n whose block has about so many unknowns: 3 for each of some 4 nodes of an element."""
-    return max(1, round((unknowns / (3 * 4 * 48)) ** (1 / 3)))
-
-
 def row(linear: str, unknowns: int, ranks: int, material: str) -> str:
     """Return the row of a run."""
     with tempfile.TemporaryDirectory() as home:
-        meshio.write(Path(home) / "block.inp", block(fineness(unknowns)))
+        meshio.write(Path(home) / "block.inp", block(counts(unknowns)))
         case = Path(home) / "case.toml"
         case.write_text(CASE.format(linear=linear, material=MATERIALS[material]), encoding="utf-8")
         words = [sys.executable, "-m", "fabfem", "solve", str(case), "--out", f"{home}/out", "--quiet"]
         here = os.environ | CALM | {"PYTHONPATH": str(HOME)}
-        before = os.getloadavg()[0]
+        load, before = os.getloadavg()[0], os.times()
         done = subprocess.run(
             ["mpiexec", "-n", str(ranks), *words], env=here, capture_output=True, text=True, check=False
         )
         if done.returncode:
             return f"{linear} {unknowns} {ranks}: {(done.stderr + done.stdout).strip()[:300]}"
+        after = os.times()
         report = json.loads((Path(home) / "out" / "report.json").read_text(encoding="utf-8"))
     found = report["ranks"]
+    spent = after.children_user + after.children_system - before.children_user - before.children_system
     parts = [
-        *(linear, int(sum(found["unknowns"])), int(sum(found["points"])), ranks),
+        *(linear, material, int(sum(found["unknowns"])), ranks),
         *(f"{max(found[phase]):.1f}" for phase in ("material", "assembly", "linear_solve")),
-        *(f"{report['wall_time']['total']:.0f}", "/".join(f"{part:.0f}" for part in found["peak_memory"])),
+        *(f"{report['wall_time']['total']:.0f}", f"{spent:.0f}"),
+        *("/".join(f"{part:.0f}" for part in found[what]) for what in ("peak_memory", "points")),
         f"{found['linear_iterations'][0]:.0f} / {found['solves'][0]:.0f}",
         "/".join(f"{part / 2**20:.2f}" for part in found["exchanged"]),
         f"{found['imbalance']['elements']}",
-        f"{before:.1f}",
+        f"{load:.1f}",
     ]
     return "| " + " | ".join(map(str, parts)) + " |"
 
@@ -131,15 +149,18 @@ def row(linear: str, unknowns: int, ranks: int, material: str) -> str:
 def main() -> None:
     """Run what the command line says."""
     parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("what", nargs="?", choices=RUNS, default="strong")
     parser.add_argument("--linear", nargs="+", default=["multigrid"])
-    parser.add_argument("--unknowns", type=int, nargs="+", default=[50000, 100000])
+    parser.add_argument("--unknowns", type=int, nargs="+")
     parser.add_argument("--ranks", type=int, nargs="+", default=[1, 2])
-    parser.add_argument("--material", choices=MATERIALS, default="sand")
+    parser.add_argument("--material", choices=MATERIALS)
     said = parser.parse_args()
+    material = said.material or ("sand" if said.what == "states" else "elastic")
+    runs = [(unknowns, ranks) for unknowns in said.unknowns or () for ranks in said.ranks] or RUNS[said.what]
+    print("| " + " | ".join(HEAD) + " |\n|" + "---|" * len(HEAD))
     for linear in said.linear:
-        for unknowns in said.unknowns:
-            for ranks in said.ranks:
-                print(row(linear, unknowns, ranks, said.material), flush=True)
+        for unknowns, ranks in runs:
+            print(row(linear, unknowns, ranks, material), flush=True)
 
 
 if __name__ == "__main__":
