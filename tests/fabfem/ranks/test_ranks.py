@@ -26,7 +26,7 @@ CALM = {
     **{"OMPI_MCA_rmaps_base_oversubscribe": "1", "OMPI_MCA_hwloc_base_binding_policy": "none"},
 }
 """Lets Open MPI start more processes than there are cores, as root in a container too."""
-EXACT = [name for name in SCENES if name not in ("multigrid", "split")]
+EXACT = [name for name in SCENES if name not in ("multigrid", "options", "split")]
 
 
 def started(ranks: int, *words: str | Path) -> subprocess.CompletedProcess[str]:
@@ -92,6 +92,13 @@ def test_multigrid_finds_what_the_direct_solver_finds(name: str, direct: str, al
     ranks = json.loads((shared / name / "report.json").read_text(encoding="utf-8"))["ranks"]
     assert ranks["direct_instead"] == [0.0, 0.0]
     assert ranks["linear_iterations"][0] < 40 * ranks["solves"][0]
+
+
+@needs_mpi
+def test_options_of_petsc_go_before_the_program_s_and_mumps_stands_in(alone: Path, shared: Path) -> None:
+    ranks = json.loads((shared / "options" / "report.json").read_text(encoding="utf-8"))["ranks"]
+    assert ranks["direct_instead"][0] == ranks["solves"][0] > 2  # one iteration, as the case says, is never enough
+    assert max(apart(alone / "solid", shared / "options").values()) < 1e-8
 
 
 @needs_mpi
