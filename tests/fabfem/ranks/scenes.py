@@ -195,7 +195,7 @@ SCENES = {
 }
 SCENES |= {
     "multigrid": SOLID + '[solver]\nlinear = "multigrid"\ntolerance = 1e-8\n',
-    "options": SOLID + '[solver]\nlinear = "multigrid"\ntolerance = 1e-8\npetsc = { ksp_max_it = 1 }\n',
+    "options": SOLID + '[solver]\nlinear = "multigrid"\npetsc = { ksp_max_it = 1 }\n',
     "split": WET + '[solver]\nlinear = "multigrid"\ntolerance = 1e-8\n',
 }
 
