@@ -143,8 +143,8 @@ def start(
     least, opening = (mean(stress).min() if n else np.inf), material.open_pressure * material.reference_pressure
     if 0.0 < least < CLOSED * opening:
         raise ValueError(
-            f"the mean pressure {least:.3g} is below {CLOSED:g} times the one at which the packing opens, {opening:.3g}; "
-            "begin at more or lower open_pressure"
+            f"the mean pressure {least:.3g} is below {CLOSED:g} times the one at which the packing opens, "
+            f"{opening:.3g}; begin at more or lower open_pressure"
         )
     force = contact_forces(material, directions, stress, fabric, void_ratio)
     normal, ratio = mobilised(material, directions, force)
