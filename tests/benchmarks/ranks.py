@@ -78,7 +78,7 @@ def begun(name: str, case: Path, folder: Path, said: argparse.Namespace) -> str:
     spent = after.children_user + after.children_system - before.children_user - before.children_system
     lines = [line for line in told.splitlines() if "fabfem:" in line or "Error" in line]
     why = (lines or [f"status {status}"])[0] if status else ""
-    ended = {"whole": status == 0 and not said.increments, "why": why, "processor": round(spent, 1)}
+    ended = {"whole": status == 0, "increments": said.increments, "why": why, "processor": round(spent, 1)}
     (folder / "ended.json").write_text(json.dumps(ended), encoding="utf-8")
     return why
 
@@ -123,7 +123,7 @@ def compared(scene: str, said: argparse.Namespace) -> dict[str, object]:
         if ended["why"]:
             found[name] = ended["why"]
         elif name == ALONE:
-            found |= {"rows": len(rows(folder)[1]), "whole": ended["whole"]}
+            found |= {"rows": len(rows(folder)[1]), "whole": ended["whole"] and not ended["increments"]}
         else:
             found[name] = told(home / ALONE, folder, ended["whole"])
         if name.isdigit() and ended["whole"]:
