@@ -1,8 +1,8 @@
 """Make strip_half.msh: half of a strip footing B = 0.9 m on level ground, 6-node triangles.
 
 The domain is 5 B wide and 5 B deep, the surface at y = 0, the footing's base 0 ≤ x ≤ 0.45 m. Elements are finest at
-the footing's edge; ``size=0.5`` halves all of them, ``order=1`` makes 3-node triangles. Needs gmsh (``pip install gmsh``):
-``python meshes/strip_half.py [FILE [size=1] [order=2]]``.
+the footing's edge; ``size=0.5`` halves all of them, ``order=1`` makes 3-node triangles. Needs gmsh (``pip install
+gmsh``): ``python meshes/strip_half.py [FILE [size=1] [order=2]]``.
 """
 
 import sys

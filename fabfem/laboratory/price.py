@@ -117,7 +117,8 @@ def _pilot(specimen: Specimen) -> Rates:
     start, first, rows = time.process_time(), Stopwatch(), _rows(specimen)
     begun = next(rows, np.zeros(3, int))
     loading, watch, last = 0.0 if first.compiled else first.free, Stopwatch(), begun
-    for last in rows:
+    for now in rows:
+        last = now
         if watch.wall > PILOT:
             break
     alone = bool((last == begun).all())
@@ -134,7 +135,11 @@ def _rows(specimen: Specimen) -> Iterator[NDArray[np.intp]]:
         for found in path(specimen, stage, state, strain if stage.keep_strain else np.zeros(6)):
             if isinstance(found, End):
                 break
-            state, strain, now = found.state, found.strain, before + (found.increment, found.steps, found.work)
+            state, strain, now = (
+                found.state,
+                found.strain,
+                before + np.array([found.increment, found.steps, found.work]),
+            )
             if found.increment:
                 yield now
         before = now

@@ -1,7 +1,7 @@
 """Price and cost of shipped cases: ``python tests/benchmarks/prices.py [CASE ...]`` writes the table of docs/study.md.
 
-Each case is priced by ``fabfem check --price`` with an empty store of rates, run by ``fabfem solve``, and priced again. What
-a run took is the processor time of its process from start to end, on one thread, because other programs
+Each case is priced by ``fabfem check --price`` with an empty store of rates, run by ``fabfem solve``, and priced
+again. What a run took is the processor time of its process from start to end, on one thread, because other programs
 share the machine; on one that does nothing else it is the wall time.
 """
 
