@@ -35,11 +35,6 @@ class Stopwatch:
         return min(self.wall, time.process_time() - self._processor)
 
     @property
-    def share(self) -> float:
-        """Part of the wall time that a free machine would have taken."""
-        return self.free / self.wall
-
-    @property
     def compiled(self) -> bool:
         """Whether kernels were compiled meanwhile."""
         return _kernels() != self._kernels

@@ -18,8 +18,8 @@ from fabfem.fem.model import Controls
 from fabfem.fem.solve import Increment, march
 from fabfem.rates import Stopwatch, share_of, start_of
 
-PILOT = 10.0
-"""Time after which a pilot is left, with the increment that goes on then [s]."""
+PILOT, PATIENCE = 10.0, 30.0
+"""Own time, and wall time, after which a pilot is left with the increment that goes on then [s]."""
 GROWTH = {2: 1.25, 3: 1.6}
 """Power of the unknowns with which a linear solve grows, by the dimension of the mesh."""
 GROWING = ("material", "assembly", "linear_solve")
@@ -109,17 +109,19 @@ def _pilot(problem: Problem) -> Rates:
     start, loading = time.process_time(), Stopwatch()
     next(march(problem.model))
     first, watch, steps, done = 0.0 if loading.compiled else loading.free, Stopwatch(), [], True
+    lap, laps = Stopwatch(), []
     for step in march(problem.model):
         if isinstance(step, Increment):
-            steps.append(step)
-        if watch.wall > PILOT:
+            steps, laps, lap = [*steps, step], [*laps, lap.free], Stopwatch()
+        if watch.free > PILOT or watch.wall > PATIENCE:
             done = False
             break
-    counted = steps if done else steps[1:] or steps
-    spent = {name: watch.share * sum(step.timings[name] for step in counted) for name in GROWING}
-    begun = watch.share * sum(steps[0].timings.values()) if steps else 0.0
-    rates = measured(problem, spent, [step.iterations for step in counted], float(done))
-    return rates._replace(fixed=start + max(first - begun, 0.0), whole=False)
+    late = slice(0 if done else 1, None) if len(steps) > 1 else slice(None)
+    wall = sum(step.timings[name] for step in steps[late] for name in GROWING)
+    share = sum(laps[late]) / wall if wall else 1.0
+    spent = {name: share * sum(step.timings[name] for step in steps[late]) for name in GROWING}
+    rates = measured(problem, spent, [step.iterations for step in steps[late]], float(done))
+    return rates._replace(fixed=start + max(first - (laps[0] if laps else 0.0), 0.0), whole=False)
 
 
 def stored(case: BoundaryValueCase) -> Rates | None:

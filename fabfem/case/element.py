@@ -11,7 +11,6 @@ from fabfem.case.paths import AnyElementStage, Path, Six, exactly_one
 from fabfem.case.schema import AnyScene, Case
 from fabfem.case.table import Identifier, NotNegative, Positive, Table, suggest
 
-
 DIRECTIONS = "gauss_16x20"
 """Rule of contact directions where the case names none: one point can afford what a body cannot (docs/study.md)."""
 

@@ -119,7 +119,7 @@ def _pilot(specimen: Specimen) -> Rates:
     loading, watch, last = 0.0 if first.compiled else first.free, Stopwatch(), begun
     for now in rows:
         last = now
-        if watch.wall > PILOT:
+        if watch.free > PILOT:
             break
     alone = bool((last == begun).all())
     taken, seconds = (begun, loading) if alone else (last - begun, watch.free)

@@ -90,7 +90,7 @@ THICK = 0.1
 
 def bed(size: float, solid: bool) -> Mesh:
     """Return a linear mesh of the ground, 2 by 1, with the boundaries footing and surface on its top."""
-    x, up = np.linspace(0.0, 2.0, round(36 / size) + 1), np.linspace(-1.0, 0.0, round(18 / size) + 1)
+    x, up = np.linspace(0.0, 2.0, round(24 / size) + 1), np.linspace(-1.0, 0.0, round(12 / size) + 1)
     mesh = grid_mesh("hexahedron", [x, np.array([0.0, THICK]), up]) if solid else grid_mesh("quad", [x, up])
     left, on_top = mesh.points[:, 0] - 0.5, mesh.points[:, -1] == 0.0
     parts = {"footing": on_top & (left <= 1e-9), "surface": on_top & (left >= -1e-9)}
