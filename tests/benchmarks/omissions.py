@@ -202,7 +202,7 @@ def _row(less: str, few: Run, more: str, many: Run) -> tuple[str, ...]:
     difference = abs(many.answer / few.answer - 1.0)
     return (
         *(f"{less} ({few.said})", f"{more} ({many.said})"),
-        f"{difference:.1e}" if difference < 0.01 else f"{100.0 * difference:.2g} %",
+        f"{difference:.1e}" if difference else "0",
         *(f"{few.seconds:.2g}, {many.seconds:.2g}", f"{many.seconds / few.seconds:.2g}"),
         *(f"{few.memory:.0f}, {many.memory:.0f}", f"{many.memory / few.memory:.2g}"),
     )
