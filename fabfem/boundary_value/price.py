@@ -108,8 +108,10 @@ def _pilot(problem: Problem) -> Rates:
     """Return the rates of the first increments; one made before, which loads kernels, counts as part of the start."""
     start, loading = time.process_time(), Stopwatch()
     next(march(problem.model))
-    first, watch, steps, done = 0.0 if loading.compiled else loading.free, Stopwatch(), [], True
-    lap, laps = Stopwatch(), []
+    first = 0.0 if loading.compiled else loading.free
+    steps: list[Increment] = []
+    laps: list[float] = []
+    watch, lap, done = Stopwatch(), Stopwatch(), True
     for step in march(problem.model):
         if isinstance(step, Increment):
             steps, laps, lap = [*steps, step], [*laps, lap.free], Stopwatch()

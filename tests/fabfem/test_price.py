@@ -5,12 +5,14 @@ from pathlib import Path
 
 import pytest
 
-from fabfem import laboratory as element
 from fabfem.boundary_value.price import expected, measured, predicted, price, remember, stored
 from fabfem.boundary_value.problem import build
 from fabfem.case import BoundaryValueCase, ElementCase, read_case
-from fabfem.cli import DONE, main
+from fabfem.cli import main
+from fabfem.commands.status import DONE
+from fabfem.laboratory import price as element
 from fabfem.laboratory.specimen import Specimen
+from fabfem.laboratory.specimen import build as build_specimen
 
 
 @pytest.fixture
@@ -113,19 +115,19 @@ def specimen_of(path: Path) -> Specimen:
     """The specimen of a case file."""
     case = read_case(path)
     assert isinstance(case, ElementCase)
-    return element.specimen.build(case)
+    return build_specimen(case)
 
 
 def test_the_rows_of_an_element_test(specimen: Specimen) -> None:
-    assert element.price.legs(specimen) == [20] * 6 + [1] * 8
+    assert element.legs(specimen) == [20] * 6 + [1] * 8
 
 
 def test_an_element_test_is_priced_at_what_it_took(specimen: Specimen) -> None:
-    rates = element.price.Rates(0.5, 10.0, 0.0, 0.25, 3.0, True)
-    found = element.price.predicted(specimen, rates)
+    rates = element.Rates(0.5, 10.0, 0.0, 0.25, 3.0, True)
+    found = element.predicted(specimen, rates)
     assert found.evaluations == 10 * 128
     assert found.seconds == pytest.approx(3.0 + 0.5 * 1280 + 0.25 * 128)
-    finer = element.price.predicted(specimen, rates._replace(steps=30.0))  # the curve needs more steps than rows
+    finer = element.predicted(specimen, rates._replace(steps=30.0))  # the curve needs more steps than rows
     assert finer.evaluations == 10 * 30 * 14
 
 
@@ -133,10 +135,10 @@ def test_rates_of_an_element_test_are_measured_and_bettered(
     specimen: Specimen, capsys: pytest.CaptureFixture[str]
 ) -> None:
     path = specimen.case.path
-    first = element.price.price(specimen)
+    first = element.price(specimen)
     assert "first rows" in first.source
     assert main(["solve", str(path), "--out", str(path.parent / "out"), "--quiet"]) == DONE
-    again = element.price.price(specimen)
+    again = element.price(specimen)
     assert "a run of this kind" in again.source
     report = json.loads((path.parent / "out" / "report.json").read_text(encoding="utf-8"))
     work = sum(stage.get("work", 0) for stage in report["stages"])
@@ -144,8 +146,6 @@ def test_rates_of_an_element_test_are_measured_and_bettered(
     assert first.evaluations == pytest.approx(again.evaluations, rel=1.0)
     longer = path.with_name("longer.toml")
     longer.write_text(ELEMENT.replace("cycles = 3", "cycles = 30"), encoding="utf-8")
-    assert element.price.price(specimen_of(longer)).evaluations == pytest.approx(
-        again.evaluations * 1208 / 128, rel=1e-6
-    )
+    assert element.price(specimen_of(longer)).evaluations == pytest.approx(again.evaluations * 1208 / 128, rel=1e-6)
     assert main(["check", str(path), "--price"]) == DONE
     assert "judged by a run of this kind" in capsys.readouterr().out
