@@ -163,7 +163,7 @@ void_ratio = 0.7
 unit_weight = 15.0
 fabric = { norm = 0.2 }
 [errors]
-estimate = ["equilibrium", "integration", "discretisation", "directions"]
+estimate = ["equilibrium", "integration", "discretisation", "directions", "substeps"]
 rule = "lebedev_17"
 samples = 7
 [checkpoint]
