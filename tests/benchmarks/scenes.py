@@ -219,6 +219,7 @@ SCENES: dict[str, Callable[[str], None]] = {
     "biaxial_band": biaxial,
     "toyoura_bedding": slope,
     "toyoura_crest_load": slope,
+    "toyoura_setback_load": slope,
 }
 """What is made of the sweep of each scene."""
 

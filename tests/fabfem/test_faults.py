@@ -257,7 +257,7 @@ def test_a_sweep_does_not_keep_a_run_that_a_disk_ended(folder: Path, monkeypatch
 
 
 def mesh_files() -> list[Path]:
-    names = ("strip_half_coarse.inp", "strip_half_coarse.msh", "slope_2to1_coarse.msh", "slope_2to1_setback.inp")
+    names = ("strip_half_coarse.inp", "strip_half_coarse.msh", "slope_2to1_coarse.msh", "slope_2to1_coarse.inp")
     return [ROOT / "meshes" / name for name in names]
 
 
