@@ -141,6 +141,12 @@ def test_a_ring_without_torque_is_the_element_test(tmp_path: Path) -> None:
     assert float(ring["deviation_q"][-1]) < 0.01 * float(ring["mean_q"][-1])
 
 
+def test_a_circular_footing_on_clay_carries_the_exact_load(tmp_path: Path) -> None:
+    pytest.importorskip("gmsh")
+    history = small("footing/circular_clay.toml", {}, tmp_path / "out")
+    assert float(history["q/c"][-1]) == pytest.approx(6.05, rel=0.02)  # [Eason & Shield 1960]
+
+
 def test_inclined_bedding_pushes_a_guided_footing_sideways(tmp_path: Path) -> None:
     pytest.importorskip("gmsh")
     history = small("footing/strip_toyoura_bedding.toml", sunk("y", {"mesh.parameters.size": 4.0}), tmp_path / "out")
