@@ -148,7 +148,7 @@ def bands(name: str) -> None:
     """Draw the axial strain at the end, a row of meshes for each viscosity."""
     runs = {(row["viscosity"], row["cells"]): row["folder"] for row in rows(name)}
     ranks = [list(dict.fromkeys(key[place] for key in runs)) for place in (0, 1)]
-    figure, grid = plt.subplots(len(ranks[0]), len(ranks[1]), figsize=(5.5, 6.5), squeeze=False)
+    figure, grid = plt.subplots(len(ranks[0]), len(ranks[1]), figsize=(6.0, 2.3 * len(ranks[0])), squeeze=False)
     for (viscosity, cells), folder in runs.items():
         axes = grid[ranks[0].index(viscosity), ranks[1].index(cells)]
         file = max((HOME / "results" / f"{name}_sweep" / folder).glob("fields_*.vtu"))
