@@ -68,6 +68,18 @@ SCENES = [
         1e-3,
     ),
     (
+        "specimen/biaxial_bedding.toml",
+        {
+            "material.sand.fabric.bedding_angle": 90.0,
+            "mesh.box.cells": [2, 4],
+            "stage[shear].displacement": [{"boundary": "top", "x": 0.0, "y": -0.0004}],
+            "stage[shear].increments": {"initial": 0.25, "maximum": 0.25},
+        },
+        "q",
+        83.0,
+        1e-3,
+    ),
+    (
         "hollow_cylinder/torsion.toml",
         {"stage[shear].control.change": 0.0002, "stage[shear].increments": {"initial": 0.1, "maximum": 0.1}},
         "hgs_tau",
