@@ -74,12 +74,13 @@ class DirectSolver:
         self.name, self.triangle = backend.name, backend.triangle
         self._backend = backend
         self._matrix = csr_matrix((0, 0))
-        self._scale = np.zeros(0)
+        self._diagonal = self._scale = np.zeros(0)
         self._failure = "no matrix was given"
 
     def factor(self, matrix: csr_matrix) -> None:
         """Factor `matrix`; a failure shows in the next `solve`."""
-        self._matrix, self._scale = matrix, np.sqrt(np.abs(matrix.diagonal()))
+        self._matrix, self._diagonal = matrix, matrix.diagonal()
+        self._scale = np.sqrt(np.abs(self._diagonal))
         self._failure = "" if np.isfinite(matrix.data).all() else "the stiffness matrix is not finite"
         self._try_factor(fresh=False)
 
@@ -133,7 +134,7 @@ class DirectSolver:
     def _product(self, x: np.ndarray) -> np.ndarray:
         if not self.triangle:
             return self._matrix @ x
-        return self._matrix @ x + self._matrix.T @ x - self._matrix.diagonal() * x
+        return self._matrix @ x + self._matrix.T @ x - self._diagonal * x
 
 
 def whole(matrix: csr_matrix, triangle: bool) -> csr_matrix:
