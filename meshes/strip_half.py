@@ -6,6 +6,7 @@ the footing's edge; ``size=0.5`` halves all of them. Needs gmsh (``pip install g
 """
 
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import gmsh
@@ -27,16 +28,16 @@ def draw(size: float) -> None:
     for name, line in zip(("symmetry", "bottom", "side", "surface", "footing"), lines, strict=True):
         gmsh.model.addPhysicalGroup(1, [line], name=name)
     gmsh.model.addPhysicalGroup(2, [ground], name="soil")
-    grade(points[4], lines[4], size)
+    grade(points[4:], lines[4], size)
 
 
-def grade(edge: int, footing: int, factor: float) -> None:
-    """Let the element size grow with the distance from the footing and from its edge."""
+def grade(edges: list[int], footing: int, factor: float) -> None:
+    """Let the element size grow with the distance from the footing and from its edges."""
     field = gmsh.model.mesh.field
     sizes = []
-    for what, tag, start in (("PointsList", edge, FINE), ("CurvesList", footing, FOOTING)):
+    for what, tags, start in (("PointsList", edges, FINE), ("CurvesList", [footing], FOOTING)):
         distance = field.add("Distance")
-        field.setNumbers(distance, what, [tag])
+        field.setNumbers(distance, what, tags)
         field.setNumber(distance, "Sampling", 200)
         size = field.add("MathEval")
         field.setString(size, "F", f"{factor} * Min({start} + {GROWTH} * F{distance}, {COARSE})")
@@ -48,8 +49,8 @@ def grade(edge: int, footing: int, factor: float) -> None:
         gmsh.option.setNumber(f"Mesh.{option}", 0)
 
 
-def main(path: Path, size: float = 1.0) -> None:
-    """Write the mesh to `path`, with elements `size` times as large as usual."""
+def main(draw: Callable[[float], None], path: Path, size: float = 1.0) -> None:
+    """Write the mesh of a drawing to `path`, with elements `size` times as large as usual."""
     gmsh.initialize()
     gmsh.option.setNumber("General.Terminal", 0)
     draw(size)
@@ -61,4 +62,4 @@ def main(path: Path, size: float = 1.0) -> None:
 
 if __name__ == "__main__":
     sizes = [float(word.removeprefix("size=")) for word in sys.argv[2:]]
-    main(Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).with_suffix(".msh"), *sizes)
+    main(draw, Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).with_suffix(".msh"), *sizes)

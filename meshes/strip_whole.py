@@ -9,7 +9,7 @@ import sys
 from pathlib import Path
 
 import gmsh
-from strip_half import COARSE, DEPTH, FINE, FOOTING, GROWTH, HALF, WIDTH
+from strip_half import DEPTH, HALF, WIDTH, grade, main
 
 
 def draw(size: float) -> None:
@@ -28,35 +28,6 @@ def draw(size: float) -> None:
     grade(points[3:5], footing, size)
 
 
-def grade(edges: list[int], footing: int, factor: float) -> None:
-    """Let the element size grow with the distance from the footing and from its edges."""
-    field = gmsh.model.mesh.field
-    sizes = []
-    for what, tags, start in (("PointsList", edges, FINE), ("CurvesList", [footing], FOOTING)):
-        distance = field.add("Distance")
-        field.setNumbers(distance, what, tags)
-        field.setNumber(distance, "Sampling", 200)
-        size = field.add("MathEval")
-        field.setString(size, "F", f"{factor} * Min({start} + {GROWTH} * F{distance}, {COARSE})")
-        sizes.append(size)
-    smallest = field.add("Min")
-    field.setNumbers(smallest, "FieldsList", sizes)
-    field.setAsBackgroundMesh(smallest)
-    for option in ("MeshSizeExtendFromBoundary", "MeshSizeFromPoints", "MeshSizeFromCurvature"):
-        gmsh.option.setNumber(f"Mesh.{option}", 0)
-
-
-def main(path: Path, size: float = 1.0) -> None:
-    """Write the mesh to `path`, with elements `size` times as large as usual."""
-    gmsh.initialize()
-    gmsh.option.setNumber("General.Terminal", 0)
-    draw(size)
-    gmsh.model.mesh.generate(2)
-    gmsh.model.mesh.setOrder(2)
-    gmsh.write(str(path))
-    gmsh.finalize()
-
-
 if __name__ == "__main__":
     sizes = [float(word.removeprefix("size=")) for word in sys.argv[2:]]
-    main(Path(sys.argv[1]), *sizes)
+    main(draw, Path(sys.argv[1]), *sizes)

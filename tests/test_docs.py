@@ -94,13 +94,13 @@ def python(code: str, ground: Path) -> str:
 
 def parsed(line: str) -> None:
     """Let the command's own parser read a line."""
-    from fabfem.cli import _parser
+    from fabfem.cli import parser
 
     words = shlex.split(line, comments=True)
     if words and words[0] == "fabfem":
         status = 0
         try:
-            _parser().parse_args(words[1:])
+            parser().parse_args(words[1:])
         except SystemExit as end:  # which --help makes, too
             status = int(end.code or 0)
         assert status == 0, line

@@ -28,7 +28,7 @@ def extremes() -> Iterator[Extreme]:
     """Yield the sweeps."""
     steps = (1e4, 1e3, 100.0, 20.0, 5.0, 1.0)
     yield sweep("undrained shear of 5 %: q", "increments, 10⁴ the reference", steps, increments, 0.02, 20.0, True)
-    pressures = tuple(10.0**k for k in range(3, -11, -1))
+    pressures = (1e3, 100.0, 10.0, 1.0, 0.1, 0.05, 0.03, 0.02, 0.015, 0.01, 1e-3, 1e-6, 1e-10)
     yield sweep("undrained shear of 1 %, 100 increments: q", "p0 [kPa]", pressures, _pressed, 0.02, 1.0)
     loose = (0.8, 0.9, 0.934, 1.0, 1.1, 1.2, 1.3, 1.4, 1.5, 1.6, 1.65, 1.66)
     yield sweep("undrained shear of 1 %, 100 increments: q", "e, loose", loose, _dense, 0.02, 1.1)

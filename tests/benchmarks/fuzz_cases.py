@@ -34,7 +34,8 @@ from typing import Any, NamedTuple
 
 from fabfem.case import CaseError, read_case, resolved
 from fabfem.case.toml import write_toml
-from fabfem.cli import BAD_INPUT, DONE, INTERRUPTED, STOPPED, main
+from fabfem.cli import main
+from fabfem.commands.status import BAD_INPUT, DONE, INTERRUPTED, STOPPED
 from fabfem.output.history import read_history
 
 ROOT = Path(__file__).parents[2]

@@ -7,7 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from fabfem.cli import BAD_INPUT, DONE, STOPPED, main
+from fabfem.cli import main
+from fabfem.commands.status import BAD_INPUT, DONE, STOPPED
 
 HEAVY = ("numpy", "scipy", "numba", "vtkmodules", "pyvista", "meshio", "pydantic", "rich", "matplotlib")
 

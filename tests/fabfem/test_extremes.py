@@ -6,7 +6,8 @@ from importlib.util import find_spec
 
 import pytest
 
-from fabfem.cli import BAD_INPUT, DONE, RED, main
+from fabfem.cli import main
+from fabfem.commands.status import BAD_INPUT, DONE, RED
 from fabfem.extremes import agreement, report, sand, stiff
 from fabfem.extremes.refusals import BODIES, refusals
 from fabfem.extremes.sweep import Found, sweep

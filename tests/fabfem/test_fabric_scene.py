@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 
 from fabfem.case import read_case
-from fabfem.cli import BAD_INPUT, DONE, STOPPED, main
+from fabfem.cli import main
+from fabfem.commands.status import BAD_INPUT, DONE, STOPPED
 
 CASES = Path(__file__).parents[2] / "cases" / "fabric"
 LAW = '[scene]\nkind = "fabric"\n[law.mine]\nlaw = "li_dafalias"\n'

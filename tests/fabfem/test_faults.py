@@ -14,7 +14,8 @@ from pathlib import Path
 import pytest
 
 from fabfem.case import CaseError
-from fabfem.cli import BAD_INPUT, INTERRUPTED, STOPPED, main
+from fabfem.cli import main
+from fabfem.commands.status import BAD_INPUT, INTERRUPTED, STOPPED
 from fabfem.outcome import FolderError, claimed
 from fabfem.output.checkpoints import newest
 from fabfem.output.history import read_history

@@ -7,7 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from fabfem.cli import BAD_INPUT, main
+from fabfem.cli import main
+from fabfem.commands.status import BAD_INPUT
 
 ROOT = Path(__file__).parents[2]
 SPEC = importlib.util.spec_from_file_location("fuzz_cases", ROOT / "tests" / "benchmarks" / "fuzz_cases.py")

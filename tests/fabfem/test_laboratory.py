@@ -16,7 +16,8 @@ from scipy.spatial.transform import Rotation
 
 from fabfem.case import CaseError, case_from
 from fabfem.case.toml import write_toml
-from fabfem.cli import STOPPED, main
+from fabfem.cli import main
+from fabfem.commands.status import STOPPED
 from fabfem.laboratory.landmarks import Rows, landmarks
 from fabfem.laboratory.plans import plan
 from fabfem.laboratory.run import describe

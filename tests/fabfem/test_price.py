@@ -8,7 +8,8 @@ import pytest
 from fabfem.boundary_value.price import expected, measured, predicted, price, remember, stored
 from fabfem.boundary_value.problem import build
 from fabfem.case import BoundaryValueCase, read_case
-from fabfem.cli import DONE, main
+from fabfem.cli import main
+from fabfem.commands.status import DONE
 
 
 @pytest.fixture

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from fabfem.case import CaseError, case_from, read_case
-from fabfem.cli import BAD_INPUT, DONE, RED, main
+from fabfem.cli import main
+from fabfem.commands.status import BAD_INPUT, DONE, RED
 from fabfem.run import run_case
 from tests.fabfem.conftest import CASE, write_mesh
 from tests.umat.compiled import compiled

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from fabfem.case import CaseError
-from fabfem.cli import NO_PICTURE, main
+from fabfem.cli import main
+from fabfem.commands.status import NO_PICTURE
 from fabfem.pictures import show as module
 from fabfem.pictures.show import NO_OPENGL, show
 

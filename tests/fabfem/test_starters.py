@@ -11,10 +11,11 @@ from pathlib import Path
 import jsonschema
 import pytest
 
-from fabfem.authoring import SHELLS
 from fabfem.case import CaseError, case_from, read_case
 from fabfem.case.json_schema import schema
-from fabfem.cli import BAD_INPUT, DONE, main
+from fabfem.cli import main
+from fabfem.commands.authoring import SHELLS
+from fabfem.commands.status import BAD_INPUT, DONE
 from fabfem.output.history import read_history
 from fabfem.starters import KINDS, SCHEMA
 

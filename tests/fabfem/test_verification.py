@@ -5,7 +5,8 @@ from collections.abc import Iterator
 
 import pytest
 
-from fabfem.cli import BAD_INPUT, DONE, RED, main
+from fabfem.cli import main
+from fabfem.commands.status import BAD_INPUT, DONE, RED
 from fabfem.verification import bearing_capacity, circular_footing, convergence, cylinder, problems
 from fabfem.verification.ground import Ground, footing
 from fabfem.verification.report import cells

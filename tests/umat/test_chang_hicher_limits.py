@@ -5,7 +5,7 @@ import pytest
 
 import umat
 from umat import mandel, status
-from umat.chang_hicher.material import contact_forces, mobilised
+from umat.chang_hicher.material import CLOSED, contact_forces, mobilised
 from umat.lanes import COMPILED
 from umat.sands import toyoura
 
@@ -105,6 +105,19 @@ def test_starts_that_cannot_be(material, isotropic_start, rule):
         umat.initial_state(material, rule, [[100.0, 800.0, 100.0, 0.0, 0.0, 0.0]], void_ratio=0.8)
     with pytest.raises(ValueError, match="outside the domain"):
         umat.initial_state(material, rule, -100.0 * mandel.IDENTITY[None], void_ratio=0.8)
+    with pytest.raises(ValueError, match="below 2 times the one at which the packing opens"):
+        umat.initial_state(material, rule, 0.015 * mandel.IDENTITY[None], void_ratio=0.8)
+
+
+def test_the_least_pressure_at_the_start_does_not_depend_on_the_increment(material, rule):
+    p = CLOSED * material.open_pressure * material.reference_pressure
+    ends = []
+    for count in (10, 100):
+        state = umat.initial_state(material, rule, p * mandel.IDENTITY[None], void_ratio=0.833)
+        for _ in range(count):
+            state = umat.update(material, rule, 0.01 / count * SHEAR[None], state).state
+        ends.append(mandel.q(state.stress)[0])
+    assert ends[0] == pytest.approx(ends[1], rel=2e-3)
 
 
 @pytest.mark.parametrize("name", ["normal_stiffness", "friction_angle", "reference_pressure", "tolerance"])

@@ -42,6 +42,8 @@ def exported(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFa
     try:
         layout = export_umat(sand, RULE, library)
     except ValueError as error:
+        if "no linker was found" not in str(error):
+            raise
         pytest.skip(str(error))
     return sand, External(str(library), PROPERTIES, layout.state_variables, thread_safe=True)
 

@@ -41,6 +41,11 @@ class ChangHicher(NamedTuple):
     max_evaluations: int = 2000  #: bound on the work of one point
 
 
+CLOSED = 2.0
+"""Least mean pressure at the start, over the one at which the packing opens [-]: nearer to it, whether a point gains
+strength or comes apart depends on the increment."""
+
+
 class ChangHicherState(NamedTuple):
     """State of n points; N directions."""
 
@@ -122,7 +127,8 @@ def start(
     """Return the state at the start of a path: the sliding done is what the forces need, so nothing slips at rest.
 
     stress: (n, 6); void_ratio: () or (n,); fabric: (6,) or (n, 6) Mandel components of F.
-    Raises ValueError if a stress lies outside the domain of the contact law, or E(n) = 1 + F:nn is not positive.
+    Raises ValueError if a stress lies outside the domain of the contact law, p is below `CLOSED` times the pressure at
+    which the packing opens, or E(n) = 1 + F:nn is not positive.
     """
     stress = checked_vectors("stress", stress)
     n = len(stress)
@@ -134,6 +140,12 @@ def start(
         raise ValueError(f"the fabric makes the density of contacts 1 + F:nn negative ({1 + lowest:.3g})")
     if np.any(void_ratio <= 0.0) or np.any(void_ratio >= 1.64):
         raise ValueError("the void ratio must lie between 0 and 1.64")
+    least, opening = (mean(stress).min() if n else np.inf), material.open_pressure * material.reference_pressure
+    if 0.0 < least < CLOSED * opening:
+        raise ValueError(
+            f"the mean pressure {least:.3g} is below {CLOSED:g} times the one at which the packing opens, "
+            f"{opening:.3g}; begin at more or lower open_pressure"
+        )
     force = contact_forces(material, directions, stress, fabric, void_ratio)
     normal, ratio = mobilised(material, directions, force)
     critical = critical_void_ratio(material, mean(stress))

@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 
 from fabfem.case import CaseError, case_from
-from fabfem.cli import BAD_INPUT, DONE, STOPPED, main
+from fabfem.cli import main
+from fabfem.commands.status import BAD_INPUT, DONE, STOPPED
 from fabfem.study.certainty import blind_spots, certainty
 from fabfem.study.processes import Job, Limits, Pool, fits, limits
 from fabfem.study.store import run_key

@@ -1,0 +1,100 @@
+"""Commands for one case and its result: solve, check, show and replay."""
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from fabfem.commands.status import DONE, INTERRUPTED, NO_PICTURE, RED, STOPPED, fail
+from fabfem.parallel.world import first, launched
+
+if TYPE_CHECKING:
+    from fabfem.case import Case
+
+
+def add_commands(commands: argparse._SubParsersAction, common: argparse.ArgumentParser) -> None:
+    """Add the commands to those of a parser."""
+    solve = commands.add_parser("solve", parents=[common], help="run a case and write its results")
+    solve.add_argument("case", type=Path, metavar="CASE.toml")
+    solve.add_argument("--out", type=Path, metavar="DIR", help="folder of the results (default: results/CASE)")
+    origin = solve.add_mutually_exclusive_group()
+    origin.add_argument("--resume", action="store_true", help="go on from the last checkpoint in the results, if any")
+    origin.add_argument("--branch", type=Path, metavar="DIR", help="begin a new result from the last state in DIR")
+    solve.set_defaults(command=_solve, shared=True)
+
+    check = commands.add_parser("check", parents=[common], help="validate a case and say what its scene leaves out")
+    check.add_argument("case", type=Path, metavar="CASE.toml")
+    check.add_argument("--price", action="store_true", help="predict the time; the first of its kind runs for 10 s")
+    check.set_defaults(command=_check, shared=True)
+
+    show = commands.add_parser("show", parents=[common], help="draw pictures of a result")
+    show.add_argument("folder", type=Path, metavar="DIR")
+    show.set_defaults(command=_show)
+
+    again = commands.add_parser("replay", parents=[common], help="run again alone what failed in a run")
+    again.add_argument("folder", type=Path, metavar="DIR", help="a result, or one of the folders in its replay/")
+    again.set_defaults(command=_replay)
+
+
+def _solve(options: argparse.Namespace) -> int:
+    from fabfem.case import read_case
+    from fabfem.restart import Restart
+    from fabfem.run import remember_cost, run_case
+
+    case = read_case(options.case)
+    if case.scene.kind != "boundary_value" and not first():
+        return DONE  # what has no mesh is done by one process
+    folder, restart = options.out or Path("results") / options.case.stem, Restart(options.resume, options.branch)
+    outcome = run_case(case, folder, quiet=options.quiet, restart=restart)
+    if first() and not options.quiet:
+        print(outcome.summary(_error_class(case)))
+    if outcome.status == "completed":
+        if not launched():
+            remember_cost(case, outcome.folder)
+        return DONE
+    return fail(outcome.reason, INTERRUPTED if outcome.status == "interrupted" else STOPPED)
+
+
+def _error_class(case: "Case") -> str:
+    """Return the error class of the case's settings in a sentence, if a study of it is kept beside it."""
+    if not case.path.with_suffix(".study.json").is_file():
+        return ""
+    from fabfem.study.accuracy import accuracy_sentence
+
+    return accuracy_sentence(case)
+
+
+def _check(options: argparse.Namespace) -> int:
+    from fabfem.case import read_case, resolved
+    from fabfem.output.progress import summary
+    from fabfem.run import describe_case, price_case
+
+    case = read_case(options.case)
+    description = describe_case(case)
+    if first() and not options.quiet:
+        print(resolved(case))
+        print("# What the scene leaves out:", *description.omitted, sep="\n#   ")
+        cost = price_case(case) if options.price else ""
+        remains = (*description.remains, *([("time", cost)] if cost else []))
+        print("# What remains:\n" + summary(remains, prefix="#   "))
+    return DONE
+
+
+def _show(options: argparse.Namespace) -> int:
+    from fabfem.pictures.show import show
+
+    shown = show(options.folder)
+    if not options.quiet:
+        print("\n".join(str(picture) for picture in shown.pictures))
+    return fail(shown.trouble, NO_PICTURE) if shown.trouble else DONE
+
+
+def _replay(options: argparse.Namespace) -> int:
+    from fabfem.replay import replay
+
+    same = True
+    for found in replay(options.folder):
+        same &= found.same
+        if not options.quiet:
+            how = "the same as then" if found.same else "NOT the same as then"
+            print(str(found.folder), *found.lines, how, "", sep="\n")
+    return DONE if same else RED
