@@ -1,6 +1,7 @@
 """The footings by fabfem and by its peers, in turn, and how fabfem's cost grows: tables of docs/performance.md.
 
     python tests/benchmarks/peers/compare.py --dofs 5k 20k 81k --repeats 3 --felupe /tmp/peers/bin/python
+    python tests/benchmarks/peers/compare.py --dofs 20k --repeats 1 --skfem python --ccx python
     python tests/benchmarks/peers/compare.py --dofs solid-50k solid-150k --repeats 1
     python tests/benchmarks/peers/compare.py --growth --repeats 3
 
@@ -48,7 +49,7 @@ def programs(asked: argparse.Namespace, dofs: str) -> list[list[str]]:
         peers = [(asked.dolfinx, "dolfinx_run.py", kind) for kind in ("lu", "cholesky")]
         peers += [(asked.felupe, "felupe_run.py"), (asked.skfem, "skfem_run.py"), (asked.ccx, "ccx_run.py")]
     for interpreter, script, *more in peers:
-        if interpreter and Path(interpreter).exists():
+        if which(interpreter):
             commands.append([interpreter, str(HERE / script), dofs, *more])
     return commands
 
@@ -113,8 +114,8 @@ def main() -> None:
     parser.add_argument("--repeats", type=int, default=3)
     parser.add_argument("--dolfinx", default="/usr/bin/python3")
     parser.add_argument("--felupe", default="")
-    parser.add_argument("--skfem", default=sys.executable)
-    parser.add_argument("--ccx", default=sys.executable if which("ccx") else "")
+    parser.add_argument("--skfem", default="")
+    parser.add_argument("--ccx", default="")
     parser.add_argument("--growth", action="store_true")
     asked = parser.parse_args()
     (growth if asked.growth else compare)(asked)
