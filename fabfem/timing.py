@@ -1,8 +1,8 @@
-"""Wall time by phase."""
+"""Wall time by phase, and processor time."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from time import perf_counter
+from time import perf_counter, process_time
 
 
 class Timer:
@@ -15,7 +15,7 @@ class Timer:
     """
 
     def __init__(self, phases: Sequence[str]) -> None:
-        self._begun = perf_counter()
+        self._begun, self._start, self._resumed = perf_counter(), process_time(), False
         self.spent = dict.fromkeys(phases, 0.0)
 
     @contextmanager
@@ -40,7 +40,14 @@ class Timer:
         """Count the times of an earlier run too, `total` in all."""
         self.add({name: seconds for name, seconds in spent.items() if name in self.spent})
         self._begun -= total
+        self._resumed = total > 0.0
 
     def total(self) -> float:
         """Return the time since the timer was made [s]."""
         return perf_counter() - self._begun
+
+    def processor(self) -> dict[str, float]:
+        """Return the processor time of the process before the timer was made and since [s]; nothing once resumed."""
+        if self._resumed:
+            return {}
+        return {"start": round(self._start, 4), "run": round(process_time() - self._start, 4)}

@@ -1,8 +1,8 @@
 """Make strip_half.msh: half of a strip footing B = 0.9 m on level ground, 6-node triangles.
 
 The domain is 5 B wide and 5 B deep, the surface at y = 0, the footing's base 0 ≤ x ≤ 0.45 m. Elements are finest at
-the footing's edge; ``size=0.5`` halves all of them. Needs gmsh (``pip install gmsh``):
-``python meshes/strip_half.py [FILE [size=1]]``.
+the footing's edge; ``size=0.5`` halves all of them, ``order=1`` makes 3-node triangles. Needs gmsh (``pip install
+gmsh``): ``python meshes/strip_half.py [FILE [size=1] [order=2]]``.
 """
 
 import sys
@@ -49,17 +49,17 @@ def grade(edges: list[int], footing: int, factor: float) -> None:
         gmsh.option.setNumber(f"Mesh.{option}", 0)
 
 
-def main(draw: Callable[[float], None], path: Path, size: float = 1.0) -> None:
-    """Write the mesh of a drawing to `path`, with elements `size` times as large as usual."""
+def main(draw: Callable[[float], None], path: Path, size: float = 1.0, order: float = 2.0) -> None:
+    """Write the mesh of a drawing to `path`, with elements `size` times as large as usual and of an order."""
     gmsh.initialize()
     gmsh.option.setNumber("General.Terminal", 0)
     draw(size)
     gmsh.model.mesh.generate(2)
-    gmsh.model.mesh.setOrder(2)
+    gmsh.model.mesh.setOrder(int(order))
     gmsh.write(str(path))
     gmsh.finalize()
 
 
 if __name__ == "__main__":
-    sizes = [float(word.removeprefix("size=")) for word in sys.argv[2:]]
-    main(draw, Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).with_suffix(".msh"), *sizes)
+    said = {name: float(value) for name, _, value in (word.partition("=") for word in sys.argv[2:])}
+    main(draw, Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).with_suffix(".msh"), **said)

@@ -3,12 +3,14 @@
 * ``equilibrium``: the force that the last iteration left out of balance, with the drag of the viscosity, over the
   forces at work.
 * ``integration``: the error of the stress that the points estimate for their own steps, over the stress, both root mean
-  square over the volume, added up over the increments. Materials in closed form have none.
+  square over the volume, added up over the increments. Materials in closed form have none. It is the error of the
+  lower of two orders and keeps its sign to itself, so that the truth is far below (docs/study.md).
+* ``substeps``: the same error, from some points of each zone, spread evenly over its volume, that go through the same
+  strains with a hundredth of the tolerance; the distance of the two stresses over the first, both root mean square.
 * ``discretisation``: of the mesh, in the energy norm, from the recovered stress (`fabfem.fem.recovery`), over the norm
   of the stress. The field ``discretisation_error`` says where: the root of the error's energy density over the mean
   energy density.
-* ``directions``: of the set of contact directions. Some points of each zone, spread evenly over its volume, go through
-  the same strains with a second rule; the distance of the two stresses over the first, both root mean square.
+* ``directions``: of the set of contact directions, by a second rule instead of a smaller tolerance.
 """
 
 from collections.abc import Callable, Mapping
@@ -29,6 +31,8 @@ from umat.mandel import Array, norm
 from umat.status import OK
 
 FIELD = "discretisation_error"
+FINER = 0.01
+"""Tolerance of the points that are followed a second time, over their own."""
 
 
 class Discretisation:
@@ -97,7 +101,7 @@ class Integration:
 
 
 class _Sampled(NamedTuple):
-    """Some points of a zone under the second rule."""
+    """Some points of a zone and how they are followed a second time."""
 
     zone: Zone
     second: Substance
@@ -107,8 +111,8 @@ class _Sampled(NamedTuple):
     """Their numbers in the zone."""
 
 
-class Directions:
-    """The error of the set of contact directions."""
+class Followed:
+    """An error that shows when some points go through the same strains in a second way."""
 
     def __init__(self, model: Model, seconds: Mapping[str, Substance], samples: int) -> None:
         self.model = model
@@ -118,7 +122,7 @@ class Directions:
         self._last: tuple[int, Array] | None = None
 
     def value(self, increment: Increment) -> Value:
-        """Return the distance of the stresses by the two rules; nothing where the second refused all points."""
+        """Return the distance of the stresses by the two ways; nothing where the second refused all points."""
         strain = self.model.space.strain(increment.displacement - self._before(increment))
         self._last = increment.stage_index, increment.displacement
         followed = [self._follow(name, strain, increment) for name in self.sampled]
@@ -152,7 +156,7 @@ class Directions:
 
 
 def error_columns(
-    case: BoundaryValueCase, model: Model, second: Callable[[str], Mapping[str, Substance]]
+    case: BoundaryValueCase, model: Model, second: Callable[[str | None], Mapping[str, Substance]]
 ) -> tuple[tuple[Column, ...], Discretisation | None]:
     """Return the columns of the errors that a case asks for, and the estimate of the mesh's if it is among them.
 
@@ -163,7 +167,7 @@ def error_columns(
     model : Model
         What is run.
     second : callable
-        Name of a rule -> substances by zone with that rule, of the zones that have contact directions.
+        Name of a rule -> substances by zone with that rule, with their own for None, where there are directions.
 
     Raises
     ------
@@ -173,7 +177,7 @@ def error_columns(
     said = case.errors
     if said is None:
         return (), None
-    apart = [name for name in said.estimate if name in ("discretisation", "directions")]
+    apart = [name for name in said.estimate if name in ("discretisation", "directions", "substeps")]
     if apart and model.space.mesh.ranks.size > 1:
         raise CaseError(f"{case.path.name}: errors.estimate: '{apart[0]}' is estimated where one process has the mesh")
     mesh = Discretisation(model)
@@ -181,22 +185,31 @@ def error_columns(
         "equilibrium": lambda: (lambda increment: increment.residuals[-1] + increment.drag, None),
         "integration": lambda: _kept(Integration(model)),
         "discretisation": lambda: (mesh.value, None),
-        "directions": lambda: _kept(Directions(model, _seconds(case, second), said.samples)),
+        "directions": lambda: _kept(Followed(model, _seconds(case, second(said.rule)), said.samples)),
+        "substeps": lambda: _kept(Followed(model, _finer(_seconds(case, second(None))), said.samples)),
     }
     columns = tuple(Column(f"error_{name}", "-", "error", *makers[name]()) for name in said.estimate)
     return columns, mesh if "discretisation" in said.estimate else None
 
 
-def _kept(error: Integration | Directions) -> tuple[Callable[[Increment], Value], Keeper]:
+def _kept(error: Integration | Followed) -> tuple[Callable[[Increment], Value], Keeper]:
     return error.value, error
 
 
-def _seconds(case: BoundaryValueCase, second: Callable[[str], Mapping[str, Substance]]) -> Mapping[str, Substance]:
-    assert case.errors is not None
-    found = second(case.errors.rule)
+def _seconds(case: BoundaryValueCase, found: Mapping[str, Substance]) -> Mapping[str, Substance]:
     if not found:
         raise CaseError(f"{case.path.name}: errors.estimate: no material here has contact directions")
     return found
+
+
+def _finer(substances: Mapping[str, Substance]) -> Mapping[str, Substance]:
+    """Return substances that integrate with a smaller tolerance, for which sub-steps have to be √(1/FINER) shorter."""
+    return {name: found._replace(material=_tightened(found.material)) for name, found in substances.items()}
+
+
+def _tightened(sand: Any) -> Any:
+    most = int(np.ceil(sand.max_evaluations / FINER**0.5))
+    return sand._replace(tolerance=FINER * sand.tolerance, max_evaluations=most)
 
 
 def _stress(model: Model, increment: Increment) -> Array:

@@ -1,30 +1,29 @@
 """What a run will cost, before it runs: time from the rates of earlier runs of the same kind on this machine.
 
-A rate is measured at first use, by a pilot: the problem is marched for some seconds and left. It is stored in the
-user's cache, and the rates of a run that completed replace those of a pilot. The kind of a run is all that decides how
+A rate is measured at first use, by a pilot: the problem is marched for some seconds and left. It is stored, and the
+rates of a run that completed replace those of a pilot (`fabfem.rates`). The kind of a run is all that decides how
 dear a point and an increment are: kinematics, element, materials with their laws and rules, tolerances and stages.
 The size of the mesh and the number of increments may differ; time is taken to grow with the points and, in the solver,
 with the unknowns to the power 1.25 in a plane and 1.6 in space, between those of a matrix's entries and of its factors.
 """
 
-import hashlib
-import json
 import time
-from pathlib import Path
 from typing import Any, NamedTuple
 
+from fabfem import rates as kept
 from fabfem.boundary_value.problem import Problem
 from fabfem.case import BoundaryValueCase
 from fabfem.case.stages import AnyStage
 from fabfem.fem.model import Controls
 from fabfem.fem.solve import Increment, march
-from fabfem.output.atomic import write_atomic
-from umat.cache import user_cache
+from fabfem.rates import Stopwatch, share_of, start_of
 
-PILOT = 10.0
-"""Time after which a pilot is left, with the increment that goes on then [s]."""
+PILOT, PATIENCE = 10.0, 30.0
+"""Own time, and wall time, after which a pilot is left with the increment that goes on then [s]."""
 GROWTH = {2: 1.25, 3: 1.6}
 """Power of the unknowns with which a linear solve grows, by the dimension of the mesh."""
+GROWING = ("material", "assembly", "linear_solve")
+"""Phases of an increment."""
 APART = ("mesh", "probe", "reaction", "derived", "output", "title", "sweep", "study", "calibration", "errors")
 """Tables that do not decide the kind of a run."""
 
@@ -41,7 +40,7 @@ class Rates(NamedTuple):
     increments: float
     """Increments over those that the sizes of the stages promise."""
     fixed: float
-    """What does not grow [s]."""
+    """What does not grow: the start of the program, mesh, kernels [s]."""
     whole: bool
     """Whether a whole run was measured, or a pilot."""
 
@@ -50,7 +49,7 @@ class Price(NamedTuple):
     """What a run will cost."""
 
     seconds: float
-    """Wall time [s]."""
+    """Wall time on a machine that does nothing else, from the command to its end [s]."""
     source: str
     """Where the rates come from."""
 
@@ -85,7 +84,10 @@ def _increments(stage: AnyStage) -> int:
 
 def remember(problem: Problem, report: dict[str, Any]) -> None:
     """Store the rates of a run that completed, from its report."""
-    _store(problem.case, measured(problem, report["wall_time"], [i["iterations"] for i in report["increments"]], 1.0))
+    free = share_of(report)
+    spent = {phase: free * seconds for phase, seconds in report["wall_time"].items()}
+    rates = measured(problem, spent, [i["iterations"] for i in report["increments"]], 1.0)
+    _store(problem.case, rates._replace(fixed=rates.fixed + start_of(report)))
 
 
 def measured(problem: Problem, spent: dict[str, float], iterations: list[int], share: float) -> Rates:
@@ -103,47 +105,46 @@ def measured(problem: Problem, spent: dict[str, float], iterations: list[int], s
 
 
 def _pilot(problem: Problem) -> Rates:
-    """Return the rates of the first increments; one made before, which compiles and loads kernels, does not count."""
+    """Return the rates of the first increments; one made before, which loads kernels, counts as part of the start."""
+    start, loading = time.process_time(), Stopwatch()
     next(march(problem.model))
-    begun, steps = time.perf_counter(), []
+    first = 0.0 if loading.compiled else loading.free
+    steps: list[Increment] = []
+    laps: list[float] = []
+    watch, lap, done = Stopwatch(), Stopwatch(), True
     for step in march(problem.model):
-        if not isinstance(step, Increment):
+        if isinstance(step, Increment):
+            steps, laps, lap = [*steps, step], [*laps, lap.free], Stopwatch()
+        if watch.free > PILOT or watch.wall > PATIENCE:
+            done = False
             break
-        steps.append(step)
-        if time.perf_counter() - begun > PILOT:
-            break
-    counted = steps[1:] or steps
-    names = ("material", "assembly", "linear_solve")
-    spent = {name: sum(step.timings[name] for step in counted) for name in names}
-    first = time.perf_counter() - begun - sum(sum(step.timings.values()) for step in steps)
-    return measured(problem, spent, [step.iterations for step in counted], 0.0)._replace(fixed=max(first, 0.0))
+    late = slice(0 if done else 1, None) if len(steps) > 1 else slice(None)
+    wall = sum(step.timings[name] for step in steps[late] for name in GROWING)
+    share = sum(laps[late]) / wall if wall else 1.0
+    spent = {name: share * sum(step.timings[name] for step in steps[late]) for name in GROWING}
+    rates = measured(problem, spent, [step.iterations for step in steps[late]], float(done))
+    return rates._replace(fixed=start + max(first - (laps[0] if laps else 0.0), 0.0), whole=False)
 
 
 def stored(case: BoundaryValueCase) -> Rates | None:
     """Return the rates of the kind of a case, if they are known."""
     try:
-        return Rates(**json.loads(_file(case).read_text(encoding="utf-8")))
-    except (OSError, ValueError, TypeError):
+        return Rates(**(kept.stored(_kind(case)) or {}))
+    except TypeError:
         return None
 
 
 def _store(case: BoundaryValueCase, rates: Rates) -> None:
-    file = _file(case)
-    try:
-        file.parent.mkdir(parents=True, exist_ok=True)
-        write_atomic(file, json.dumps(rates._asdict()) + "\n")
-    except OSError:
-        return  # a cache that cannot be written costs no more than the next pilot
+    kept.store(_kind(case), rates._asdict())
 
 
-def _file(case: BoundaryValueCase) -> Path:
-    """Return the file of the rates of a kind of run."""
+def _kind(case: BoundaryValueCase) -> dict[str, Any]:
+    """Return what tells the kind of a run."""
     said = case.model_dump(mode="json", exclude=set(APART))
     for stage in said["stage"]:
         stage.pop("increments")
-    said["mesh"] = {"order": case.mesh.order, "points": case.mesh.points, "box": case.mesh.box and case.mesh.box.shape}
-    key = hashlib.sha256(json.dumps(said, sort_keys=True).encode()).hexdigest()[:16]
-    return user_cache() / "fabfem-rates" / f"{key}.json"
+    box = case.mesh.box and case.mesh.box.shape
+    return said | {"mesh": {"order": case.mesh.order, "points": case.mesh.points, "box": box}}
 
 
 def _unknowns(problem: Problem) -> float:

@@ -136,13 +136,15 @@ def _surroundings(case: BoundaryValueCase, space: Space) -> Surroundings:
     return Surroundings(case.unit_system, space.mesh.dim - 1, flat, case.path.parent)
 
 
-def _with_rule(case: BoundaryValueCase, space: Space, rule: str) -> dict[str, Substance]:
-    """Return the substance of each zone that has contact directions, with another rule of them."""
+def _with_rule(case: BoundaryValueCase, space: Space, rule: str | None) -> dict[str, Substance]:
+    """Return the substance of each zone that has contact directions, with another rule of them or its own."""
     found: dict[str, Substance] = {}
     for name, table in case.material.items():
         if isinstance(table, ChangHicher):
             try:
-                filling = substance(table.model_copy(update={"directions": rule}), _surroundings(case, space))
+                filling = substance(
+                    table.model_copy(update={"directions": rule or table.directions}), _surroundings(case, space)
+                )
             except MisfitError as error:
                 raise CaseError(f"{case.path.name}: errors.rule: {error}") from error
             found |= dict.fromkeys(zones_of(case, name, space.mesh), filling)

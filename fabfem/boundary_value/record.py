@@ -189,6 +189,7 @@ class Recorder:
     def _write_report(self) -> None:
         total = self.timer.total()
         self.report.content |= shares(self.problem.model.space, self.timer)
+        self.report.content["processor_time"] = self.timer.processor()
         self.report.write({**self.timer.spent, "other": total - sum(self.timer.spent.values()), "total": total})
 
 

@@ -25,6 +25,7 @@ from fabfem.outcome import INTERRUPTED, Description, Outcome, claimed, short, un
 from fabfem.output.checkpoints import Checkpoint
 from fabfem.output.interrupt import held_back, patient
 from fabfem.output.progress import Quiet, Terminal
+from fabfem.rates import duration
 from fabfem.restart import FRESH, Restart, checkpoint_of
 from fabfem.timing import Timer
 
@@ -44,19 +45,12 @@ def describe(case: BoundaryValueCase) -> Description:
 def price(case: BoundaryValueCase) -> str:
     """Return what a run of a case will cost, in a sentence; `CaseError` if it cannot be run."""
     cost = price_of(build(case))
-    return f"about {_duration(cost.seconds)}, judged by {cost.source}"
+    return f"about {duration(cost.seconds)}, judged by {cost.source}"
 
 
 def remember(case: BoundaryValueCase, folder: Path) -> None:
     """Keep what a completed run has cost, for the price of the next one of its kind."""
     remember_run(build(case), json.loads((folder / "report.json").read_text(encoding="utf-8")))
-
-
-def _duration(seconds: float) -> str:
-    """Return a time with the unit that suits it."""
-    if seconds < 120.0:
-        return f"{seconds:.2g} s"
-    return f"{seconds / 60.0:.0f} min" if seconds < 7200.0 else f"{seconds / 3600.0:.1f} h"
 
 
 def run(

@@ -117,14 +117,14 @@ class Errors(Table):
     """Estimates of its own error that a run carries, a column of the history each."""
 
     estimate: Annotated[
-        tuple[Literal["equilibrium", "integration", "discretisation", "directions"], ...],
+        tuple[Literal["equilibrium", "integration", "substeps", "discretisation", "directions"], ...],
         Field(min_length=1, strict=False),
     ]
     """What is estimated."""
     rule: Text = "lebedev_23"
     """Second rule of contact directions, with which the directions' error is estimated."""
     samples: Annotated[int, Field(ge=1)] = 16
-    """Points of each zone that go through the second rule."""
+    """Points of each zone that are followed a second time, with the second rule or a smaller tolerance."""
 
 
 class BoundaryValueCase(Case):

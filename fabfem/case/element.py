@@ -4,11 +4,15 @@ from collections import Counter
 from collections.abc import Iterator
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field, field_validator, model_validator
 
+from fabfem.case.materials import ChangHicher
 from fabfem.case.paths import AnyElementStage, Path, Six, exactly_one
 from fabfem.case.schema import AnyScene, Case
 from fabfem.case.table import Identifier, NotNegative, Positive, Table, suggest
+
+DIRECTIONS = "gauss_16x20"
+"""Rule of contact directions where the case names none: one point can afford what a body cannot (docs/study.md)."""
 
 
 class Scene(AnyScene):
@@ -83,6 +87,18 @@ class ElementCase(Case):
     """How well the curves are to be resolved."""
     output: Output = Output()
     """What is stored besides stress and strain."""
+
+    @field_validator("material")
+    @classmethod
+    def _with_directions(cls, material: dict[str, Any]) -> dict[str, Any]:
+        return {name: _finer(table) for name, table in material.items()}
+
+
+def _finer(table: Any) -> Any:
+    """Return a material with the element test's rule of directions where it names none."""
+    if isinstance(table, ChangHicher) and "directions" not in table.model_fields_set:
+        return table.model_copy(update={"directions": DIRECTIONS})
+    return table
 
 
 def contradictions(case: ElementCase) -> Iterator[tuple[str, str]]:

@@ -125,7 +125,7 @@ class ChangHicher(Material):
     void_ratio: Annotated[float, Field(gt=0)]
     """Initial void ratio (e)."""
     directions: Text = "bazant_oh_37"
-    """Rule of contact directions."""
+    """Rule of contact directions; an element test takes gauss_16x20 when left out."""
     localisation: Literal["total", "rate"] = "total"
     """How contact forces follow the stress: from its total, or accumulated from its rate."""
     parameters: dict[str, float] = Field(default={})

@@ -17,8 +17,9 @@ from fabfem.verification.scene import Answer, Tables, held, solve, stage
 
 def extremes() -> Iterator[Extreme]:
     """Yield the sweeps."""
-    yield sweep("weightless footing, surcharge 1: Nq", "φ = ψ [degrees]", (30, 45, 50), friction, 0.1, 45)
-    yield sweep("smooth footing, c = q = 0: Nγ", "φ = ψ [degrees]", (20,), bare, 0.05, 20)
+    angles = (20, 30, 40, 45, 50, 55, 60)
+    yield sweep("weightless footing, surcharge 1: Nq", "φ = ψ [degrees]", angles, friction, 0.1, 45)
+    yield sweep("smooth footing, c = q = 0: Nγ", "φ = ψ [degrees]", (20, 30, 35, 40), bare, 0.05, 40)
     sizes = (0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0)
     yield sweep("Hill's tube, p/k = 1.2: u(a)", "increment / load", sizes, increment, 0.01, 0.2, True)
     lengths = (1.0, 4.0, 16.0, 64.0, 256.0, 1024.0)
@@ -27,10 +28,21 @@ def extremes() -> Iterator[Extreme]:
     yield sweep("footing on Toyoura sand, B/500 of settlement: load", "surcharge [kPa]", loads, sand, 0.02, 0.1)
 
 
+GROUND = {
+    20: (4.0, 2.0, 0.1),
+    30: (6.0, 3.0, 0.2),
+    40: (12.0, 5.0, 0.5),
+    45: (24.0, 10.0, 1.5),
+    50: (24.0, 10.0, 1.5),
+    55: (44.0, 18.0, 5.0),
+    60: (80.0, 34.0, 25.0),
+}
+"""Angle of friction -> width and depth of ground that holds the mechanism, settlement to the limit, all in B."""
+
+
 def friction(angle: float) -> Found:
     """Return Nq of a smooth footing on a coarse mesh."""
-    ground = {20: (4.0, 2.0, 0.1), 30: (6.0, 3.0, 0.2), 40: (12.0, 5.0, 0.5)}.get(int(angle), (24.0, 10.0, 1.5))
-    width, depth, settlement = ground
+    width, depth, settlement = GROUND[int(angle)]
     answer = solve(
         footing(soil(angle, cohesion=0.0), settlement, False, 1.0), Ground(width, depth, 0.02, 1.25).mesh("quad")
     )

@@ -148,6 +148,7 @@ class Recorder:
 
     def _write(self) -> None:
         total = self.timer.total()
+        self.report.content["processor_time"] = self.timer.processor()
         self.report.write({**self.timer.spent, "other": total - sum(self.timer.spent.values()), "total": total})
 
 

@@ -1,5 +1,6 @@
 """An element test from the case to the last row: lead the specimen through its stages, write, say how it ended."""
 
+import json
 from collections.abc import Callable, Iterator
 from pathlib import Path as Folder
 from typing import Any
@@ -10,12 +11,15 @@ from fabfem.case import CaseError, ElementCase
 from fabfem.case.paths import Path, Probe
 from fabfem.failures import keep_stage
 from fabfem.identity import identity
+from fabfem.laboratory.price import price as price_of
+from fabfem.laboratory.price import remember as remember_run
 from fabfem.laboratory.record import PHASES, STANDING, Reached, Recorder, Written
 from fabfem.laboratory.specimen import Specimen, build
 from fabfem.laboratory.stages import End, path
 from fabfem.outcome import INTERRUPTED, Description, Outcome, claimed, short, unwritten
 from fabfem.output.interrupt import held_back, patient
 from fabfem.output.progress import Quiet, Terminal
+from fabfem.rates import duration
 from fabfem.restart import FRESH, Restart, checkpoint_of
 from fabfem.timing import Timer
 from umat.mandel import Array
@@ -31,6 +35,17 @@ def describe(case: ElementCase) -> Description:
     """
     specimen = build(case)
     return Description(specimen.omitted, tuple(_remaining(specimen)))
+
+
+def price(case: ElementCase) -> str:
+    """Return what a run of a case will cost, in a sentence; `CaseError` if it cannot be run."""
+    cost = price_of(build(case))
+    return f"about {duration(cost.seconds)}, {cost.evaluations:.2g} evaluations, judged by {cost.source}"
+
+
+def remember(case: ElementCase, folder: Folder) -> None:
+    """Keep what a completed run has cost, for the price of the next one of its kind."""
+    remember_run(build(case), json.loads((folder / "report.json").read_text(encoding="utf-8")))
 
 
 def _remaining(specimen: Specimen) -> Iterator[tuple[str, str]]:

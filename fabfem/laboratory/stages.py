@@ -34,6 +34,10 @@ class Point(NamedTuple):
     """State of the material, of one point."""
     leg: int
     """Number of the leg, from 0; a stage without reversals has one."""
+    steps: int = 0
+    """Steps since the start of the stage."""
+    work: int = 0
+    """Evaluations of the material since then."""
 
 
 class End(NamedTuple):
@@ -66,7 +70,8 @@ def path(specimen: Specimen, stage: Path, state: Any, strain: Array) -> Iterator
             if moment.steps[0] > seen:
                 row, seen = row + 1, moment.steps[0]
                 fraction = (number + float(moment.fraction[0])) / len(todo.targets)
-                yield Point(stage.name, row, fraction, base + moment.strain[0], moment.state, number)
+                gone = steps + seen, work + int(moment.work[0])
+                yield Point(stage.name, row, fraction, base + moment.strain[0], moment.state, number, *gone)
         state, strain = moment.state, base + moment.strain[0]
         steps, work, error = steps + int(moment.steps[0]), work + int(moment.work[0]), error + float(moment.error[0])
         if moment.ended[0] != DONE:

@@ -203,3 +203,32 @@ def test_impossible_errors_get_a_sentence(sand: dict[str, Any], place: str, valu
     with pytest.raises(CaseError) as caught:
         build(case_from(variant(sand, [Setting("", (place,), value)])))  # type: ignore[arg-type]
     assert sentence in str(caught.value)
+
+
+def ended(tables: dict[str, Any], tolerance: float) -> tuple[np.ndarray, float]:
+    """Return the stress (n, 6) at the end of a run of the sand, and the error of its sub-steps."""
+    case = case_from(variant(tables, [Setting("", ("material.sand.parameters.tolerance",), tolerance)]))
+    assert isinstance(case, BoundaryValueCase)
+    problem = build(case)
+    (column,) = (column for column in problem.columns if column.name == "error_substeps")
+    for step in march(problem.model):
+        assert isinstance(step, Increment)
+        said = column.value(step)
+    return step.states["all"].stress, float(said)
+
+
+def test_the_error_of_substeps_is_the_true_one(sand: dict[str, Any]) -> None:
+    sand["errors"] = {"estimate": ["substeps"]}
+    sand["output"]["fields"] = ["stress"]
+    exact, _ = ended(sand, 1e-6)
+    for tolerance in (1e-2, 1e-3):
+        stress, said = ended(sand, tolerance)
+        assert 0.5 < said / (np.linalg.norm(stress - exact) / np.linalg.norm(exact)) < 2.0
+
+
+def test_substeps_need_a_material_that_takes_them(sand: dict[str, Any]) -> None:
+    sand["material"]["sand"] = {"model": "elastic", "youngs_modulus": 1e4, "poisson_ratio": 0.3}
+    sand["errors"] = {"estimate": ["substeps"]}
+    sand["output"]["fields"] = ["stress"]
+    with pytest.raises(CaseError, match=r"errors\.estimate: no material here has contact directions"):
+        build(case_from(sand))
