@@ -1,9 +1,10 @@
 """Make the slope meshes: 8-node quadrilaterals, finest where the slip surfaces run.
 
-Every slope falls to the right, its toe at the origin. The boundaries are left, right, bottom, crest, face, toe (the
-level ground before it, where there is some); the zone above the toe is "slope", below it "ground". Needs gmsh
-(``pip install gmsh``): ``python meshes/slope.py [FOLDER [FORMAT]]`` writes one file for each slope of `SLOPES`, in
-gmsh's format 4.1 (``msh``) or as Abaqus input (``inp``).
+Every slope falls to the right, its toe at the origin. The boundaries are left, right, bottom, crest, edge (the
+part of the crest that a load keeps off, where there is one), face, toe (the level ground before it, where there is
+some); the zone above the toe is "slope", below it "ground". Needs gmsh (``pip install gmsh``): ``python meshes/slope.py
+[FOLDER [FORMAT]]`` writes one file for each slope of `SLOPES`, in gmsh's format 4.1 (``msh``) or as Abaqus input
+(``inp``).
 """
 
 import sys
@@ -29,6 +30,8 @@ class Slope(NamedTuple):
     """Element size at the toe and along the face."""
     coarse: float = 2.5
     """Element size far away."""
+    setback: float = 0.0
+    """Length of the crest next to the face that is a boundary of its own, "edge": a load on the crest keeps off it."""
 
 
 SLOPES = {
@@ -36,6 +39,7 @@ SLOPES = {
     "slope_2to1_medium": Slope(height=10.0, run=20.0, crest=12.0, fine=0.9, coarse=2.0),
     "slope_2to1_fine": Slope(height=10.0, run=20.0, crest=12.0, fine=0.3, coarse=0.7),
     "slope_2to1_coarse": Slope(height=10.0, run=20.0, crest=10.0, fine=2.0, coarse=2.5),
+    "slope_2to1_setback": Slope(height=10.0, run=20.0, crest=12.0, fine=1.4, coarse=2.5, setback=3.0),
     "slope_45": Slope(height=10.0, run=10.0, crest=12.0, toe=8.0, depth=5.0, fine=0.5, coarse=1.5),
     "slope_2to1_ground": Slope(height=10.0, run=20.0, crest=12.0, toe=10.0, depth=5.0, fine=0.6, coarse=1.6),
 }
@@ -51,6 +55,8 @@ def draw(slope: Slope) -> None:
         "crest": (-slope.run, slope.height),
         "d": (back, slope.height),
     }
+    if slope.setback:
+        corners["back"] = (-slope.run - slope.setback, slope.height)
     if slope.depth:
         corners |= {"e": (slope.toe, 0.0), "f": (slope.toe, -slope.depth), "g": (back, -slope.depth)}
     points = {name: add.addPoint(x, y, 0) for name, (x, y) in corners.items()}
@@ -58,9 +64,11 @@ def draw(slope: Slope) -> None:
     def line(start: str, end: str) -> int:
         return add.addLine(points[start], points[end])
 
-    base, face, crest, left = line("a", "toe"), line("toe", "crest"), line("crest", "d"), line("d", "a")
-    named = {"face": [face], "crest": [crest], "left": [left], "bottom": [base], "right": []}
-    zones = {"slope": add.addPlaneSurface([add.addCurveLoop([base, face, crest, left])])}
+    base, face = line("a", "toe"), line("toe", "crest")
+    edge = [line("crest", "back")] if slope.setback else []
+    crest, left = line("back" if slope.setback else "crest", "d"), line("d", "a")
+    named = {"face": [face], "edge": edge, "crest": [crest], "left": [left], "bottom": [base], "right": []}
+    zones = {"slope": add.addPlaneSurface([add.addCurveLoop([base, face, *edge, crest, left])])}
     if slope.depth:
         toe, right, bottom, deep = line("toe", "e"), line("e", "f"), line("f", "g"), line("g", "a")
         zones["ground"] = add.addPlaneSurface([add.addCurveLoop([-base, -deep, -bottom, -right, -toe])])

@@ -4,9 +4,9 @@ Both are those of `fabfem.fem.diagnosis`; each increment pays for one more facto
 """
 
 from fabfem.boundary_value.probes import Column
-from fabfem.fem.assembly import stiffness
 from fabfem.fem.diagnosis import Condition, condition
 from fabfem.fem.increment import Increment
+from fabfem.fem.linear import whole
 from fabfem.fem.model import Model
 from fabfem.fem.solve import systems_of
 
@@ -26,10 +26,8 @@ class Conditioning:
 
     def _found(self, increment: Increment) -> Condition:
         system = self._systems[increment.stage_index]
-        matrix = stiffness(system.space, system.pattern, increment.tangent)
-        if system.water is not None:
-            matrix.data += system.water.matrix(increment.size).data
-        return condition(system.reduce(matrix))
+        wet = None if system.water is None else system.water.matrix(increment.size)
+        return condition(whole(system.reduction.stiffness(increment.tangent, wet), system.solver.triangle))
 
 
 def conditioning_columns(model: Model) -> tuple[Column, ...]:

@@ -203,7 +203,7 @@ def _change(new: Substance) -> Change:
 
 def _goal(said: AnyStage) -> Goal | None:
     if isinstance(said, StrengthReduction):
-        return StrengthSearch(said.step, said.largest, said.tolerance, said.growth)
+        return StrengthSearch(said.step, said.largest, said.tolerance, said.growth, said.failure_displacement)
     control = said.control if isinstance(said, Load) else None
     if isinstance(control, stages.DisplacementControl):
         terms = [

@@ -17,7 +17,7 @@ DIALECT = "https://json-schema.org/draft/2020-12/schema"
 
 def schema() -> dict[str, Any]:
     """Return the schema of a case file of any kind of scene."""
-    kinds = [kind for kind, _ in KINDS.values()]
+    kinds = [kind.schema() for kind in KINDS.values()]
     _, found = models_json_schema([(kind, "validation") for kind in kinds])
     tables = found["$defs"]
     tables["ShortUmat"] = _short(tables["Umat"])

@@ -2,29 +2,45 @@
 
 import tomllib
 from collections.abc import Callable, Iterator
+from importlib import import_module
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from pydantic import BaseModel, ValidationError
 
-from fabfem.case.boundary_value import BoundaryValueCase
-from fabfem.case.contradictions import contradictions
-from fabfem.case.element import ElementCase
-from fabfem.case.element import contradictions as element_contradictions
-from fabfem.case.fabric import FabricCase
-from fabfem.case.fabric import contradictions as fabric_contradictions
 from fabfem.case.materials import spelled_out
 from fabfem.case.schema import Case
 from fabfem.case.sentences import CaseError, sentence
 from fabfem.case.table import suggest
 from fabfem.case.toml import write_toml
 
-KINDS: dict[str, tuple[type[Case], Callable[[Any], Iterator[tuple[str, str]]]]] = {
-    "boundary_value": (BoundaryValueCase, contradictions),
-    "fabric": (FabricCase, fabric_contradictions),
-    "element": (ElementCase, element_contradictions),
+
+class Kind(NamedTuple):
+    """A kind of scene; its modules are imported when a case is of it."""
+
+    module: str
+    table: str
+    """What a case of it may say."""
+    checks: str
+    """Module whose `contradictions` finds what no single table can see."""
+
+    def schema(self) -> type[Case]:
+        """Return the table of a case."""
+        found: type[Case] = getattr(import_module(f"fabfem.case.{self.module}"), self.table)
+        return found
+
+    def contradictions(self, case: Case) -> Iterator[tuple[str, str]]:
+        """Return the places in a case that contradict others, and what is wrong there."""
+        found: Callable[[Case], Iterator[tuple[str, str]]]
+        found = import_module(f"fabfem.case.{self.checks}").contradictions
+        return found(case)
+
+
+KINDS = {
+    "boundary_value": Kind("boundary_value", "BoundaryValueCase", "contradictions"),
+    "fabric": Kind("fabric", "FabricCase", "fabric"),
+    "element": Kind("element", "ElementCase", "element"),
 }
-"""What a case of each kind of scene may say, and the search for what no single table can see."""
 
 
 def read_case(path: str | Path) -> Case:
@@ -51,13 +67,13 @@ def case_from(tables: dict[str, Any], path: str | Path = "case.toml") -> Case:
         tables = spelled_out(tables)
     except CaseError as error:
         raise CaseError(f"{path.name}: {error}") from None
-    schema, contradicted = KINDS[_kind(tables, path)]
+    kind = KINDS[_kind(tables, path)]
     try:
-        case = schema.model_validate(tables)
+        case = kind.schema().model_validate(tables)
     except ValidationError as error:
         raise CaseError(f"{path.name}: {sentence(error, tables)}") from error
     case._path = path
-    for where, what in contradicted(case):
+    for where, what in kind.contradictions(case):
         raise CaseError(f"{path.name}: {where}: {what}")
     return case
 

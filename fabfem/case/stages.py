@@ -282,6 +282,14 @@ class StrengthReduction(Stage):
     """Width of the bracket at which the search ends."""
     growth: Positive = 10.0
     """Displacement at which a flow counts as failure, over the elastic displacement under the same loads."""
+    failure_displacement: Positive | None = None
+    """The same displacement itself [length], instead of `growth`: that of any node since the last equilibrium."""
+
+    @model_validator(mode="after")
+    def _one_limit(self) -> "StrengthReduction":
+        if self.failure_displacement is not None and self.growth != type(self).model_fields["growth"].default:
+            raise ValueError("growth and failure_displacement say the same thing in two ways; leave one of them out")
+        return self
 
 
 AnyStage = Annotated[Geostatic | Gravity | Load | StrengthReduction, Field(discriminator="kind")]

@@ -26,7 +26,7 @@ from fabfem.fem.control import Control, control
 from fabfem.fem.increment import Cutback, Increment, Place, Step, Stopped, advanced, increment
 from fabfem.fem.loads import Loading
 from fabfem.fem.model import Refusal, elastic_tangents
-from fabfem.fem.newton import Solved, stiffness_of, worst_point
+from fabfem.fem.newton import Solved, pushed, stiffness_of, worst_point
 from fabfem.fem.trial import Equilibrium, System, Task, Trial, attempt
 
 EXACT = 1e-8
@@ -226,11 +226,12 @@ def _both(
     system: System, load: Loading, tangent: np.ndarray, unbalanced: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray] | Refusal:
     constraints = system.constraints
-    whole = stiffness_of(system, Task(load.total(0.0), constraints.motion, None), tangent)
-    pushed = constraints.collect(load.total(1.0) - load.total(0.0) - system.space.summed(whole @ constraints.motion))
+    task = Task(load.total(0.0), constraints.motion, None)
+    moving = pushed(system, task, tangent, constraints.motion)
+    matrix, unit = stiffness_of(system, task, tangent), load.total(1.0) - load.total(0.0)
     with system.timer.phase("linear_solve"):
-        system.solver.factor(system.reduce(whole))
-        answers = [system.solver.solve(rhs) for rhs in (unbalanced, pushed)]
+        system.solver.factor(matrix)
+        answers = [system.solver.solve(rhs) for rhs in (unbalanced, constraints.collect(unit - moving))]
     for answer in answers:
         if not answer.ok:
             return Refusal(answer.reason)

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple, Protocol
 from weakref import finalize
 
 import numpy as np
-from scipy.sparse import csc_matrix, csr_matrix
+from scipy.sparse import csc_matrix, csr_matrix, triu
 from scipy.sparse.linalg import SuperLU, splu
 
 POOR = 1e-10
@@ -44,6 +44,7 @@ class Backend(Protocol):
     """What a direct solver offers; both may raise ArithmeticError with a reason."""
 
     name: str
+    triangle: bool
 
     def factor(self, matrix: csr_matrix, fresh: bool) -> None:
         """Factor a CSR matrix; `fresh` asks to forget what was learnt from earlier ones."""
@@ -56,6 +57,8 @@ class LinearSolver(Protocol):
     """What the Newton iteration needs; a distributed solver implements the same two functions."""
 
     name: str
+    triangle: bool
+    """Whether matrices are symmetric and given as their upper triangle alone."""
 
     def factor(self, matrix: csr_matrix) -> None:
         """Take a new matrix."""
@@ -68,15 +71,16 @@ class DirectSolver:
     """Checks and refinement around a backend."""
 
     def __init__(self, backend: Backend) -> None:
-        self.name = backend.name
+        self.name, self.triangle = backend.name, backend.triangle
         self._backend = backend
         self._matrix = csr_matrix((0, 0))
-        self._scale = np.zeros(0)
+        self._diagonal = self._scale = np.zeros(0)
         self._failure = "no matrix was given"
 
     def factor(self, matrix: csr_matrix) -> None:
         """Factor `matrix`; a failure shows in the next `solve`."""
-        self._matrix, self._scale = matrix, np.sqrt(np.abs(matrix.diagonal()))
+        self._matrix, self._diagonal = matrix, matrix.diagonal()
+        self._scale = np.sqrt(np.abs(self._diagonal))
         self._failure = "" if np.isfinite(matrix.data).all() else "the stiffness matrix is not finite"
         self._try_factor(fresh=False)
 
@@ -112,7 +116,7 @@ class DirectSolver:
         for _ in range(REFINEMENTS):
             if residual <= POOR or not np.isfinite(residual):
                 break
-            better = x + self._backend.solve(rhs - self._matrix @ x)
+            better = x + self._backend.solve(rhs - self._product(x))
             x, residual = min(((x, residual), (better, self._residual(better, rhs))), key=lambda pair: pair[1])
         return x, residual
 
@@ -124,14 +128,25 @@ class DirectSolver:
 
     def _residual(self, x: np.ndarray, rhs: np.ndarray) -> float:
         with np.errstate(over="ignore", invalid="ignore"):
-            size = norm(rhs - self._matrix @ x) / norm(rhs)
+            size = norm(rhs - self._product(x)) / norm(rhs)
         return size if np.isfinite(size) else np.inf
+
+    def _product(self, x: np.ndarray) -> np.ndarray:
+        if not self.triangle:
+            return self._matrix @ x
+        return self._matrix @ x + self._matrix.T @ x - self._diagonal * x
+
+
+def whole(matrix: csr_matrix, triangle: bool) -> csr_matrix:
+    """A matrix of which an upper triangle may be all that is given."""
+    return csr_matrix(matrix + triu(matrix, 1).T) if triangle else matrix
 
 
 class SuperLUBackend:
     """scipy's SuperLU, ordered for a symmetric pattern."""
 
     name = "superlu"
+    triangle = False
 
     def __init__(self) -> None:
         self._factors: SuperLU | None = None
@@ -159,10 +174,10 @@ _SYMMETRIC_PATTERN: dict[str, Any] = {
 }
 
 
-def _same(matrix: csr_matrix, pattern: tuple[np.ndarray, np.ndarray]) -> bool:
-    """Whether a matrix has a pattern (indptr, indices); its arrays are compared only where they are not the same."""
-    pairs = zip((matrix.indptr, matrix.indices), pattern, strict=True)
-    return all(one is other or np.array_equal(one, other) for one, other in pairs)
+def _same(matrix: csr_matrix, other: csr_matrix) -> bool:
+    """Whether two matrices have one pattern; its arrays are compared only where they are not the same."""
+    pairs = ((matrix.indptr, other.indptr), (matrix.indices, other.indices))
+    return all(mine is its or np.array_equal(mine, its) for mine, its in pairs)
 
 
 class PardisoBackend:
@@ -182,35 +197,20 @@ class PardisoBackend:
             self._solver.iparm[number - 1] = value
         # the next solver finds the library at once, instead of looking through all folders again (0.2 s)
         os.environ.setdefault("PYPARDISO_MKL_RT", self._solver.libmkl._name)
-        self._symmetric = symmetric
-        self._pattern = (np.zeros(0), np.zeros(0))
-        self._upper = np.zeros(0, bool)
+        self.triangle = symmetric
         self._matrix = csr_matrix((0, 0))
 
     def factor(self, matrix: csr_matrix, fresh: bool) -> None:
         """Factor, with a new analysis where the pattern is new or `fresh`."""
-        known = _same(matrix, self._pattern)
-        if not len(self._pattern[0]):  # there is nothing to free before
+        known = _same(matrix, self._matrix)
+        if not self._matrix.shape[0]:  # there is nothing to free before
             finalize(self, self._solver.free_memory, everything=True)
-        if not known:
-            self._pattern = (matrix.indptr, matrix.indices)
-            self._matrix = self._taken(matrix)
-        self._matrix.data = matrix.data[self._upper] if self._symmetric else matrix.data
+        self._matrix = matrix
         self._call(22 if known and not fresh else 12, np.zeros(matrix.shape[0]))
 
     def solve(self, rhs: np.ndarray) -> np.ndarray:
         """Solve with the last factors."""
         return self._call(33, rhs)
-
-    def _taken(self, matrix: csr_matrix) -> csr_matrix:
-        """What PARDISO reads of a matrix: all, or its upper triangle, whose place is then remembered."""
-        if not self._symmetric:
-            return csr_matrix((matrix.data, matrix.indices, matrix.indptr), shape=matrix.shape)
-        rows = np.repeat(np.arange(matrix.shape[0], dtype=np.int32), np.diff(matrix.indptr))
-        self._upper = matrix.indices >= rows
-        indptr = np.concatenate([[0], np.cumsum(np.bincount(rows[self._upper], minlength=matrix.shape[0]))])
-        values = np.zeros(int(indptr[-1]))
-        return csr_matrix((values, matrix.indices[self._upper], indptr.astype(np.int32)), shape=matrix.shape)
 
     def _call(self, phase: int, rhs: np.ndarray) -> np.ndarray:
         from pypardiso.pardiso_wrapper import PyPardisoError

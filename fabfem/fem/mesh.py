@@ -119,9 +119,10 @@ def quadratic(mesh: Mesh, cell_type: str = "") -> Mesh:
     points, cells = mesh.points, mesh.cells
     for width in sorted({len(m) for m in new.midside}):
         parents = mesh.cells[:, np.array([m for m in new.midside if len(m) == width])]
-        unique, number = np.unique(np.sort(parents.reshape(-1, width), axis=1), axis=0, return_inverse=True)
+        parents = np.sort(parents.reshape(-1, width), axis=1)
+        first, number = distinct(parents)
         cells = np.hstack([cells, len(points) + number.reshape(len(cells), -1)])
-        points = np.vstack([points, mesh.points[unique].mean(axis=1)])
+        points = np.vstack([points, mesh.points[parents[first]].mean(axis=1)])
     facets = _facets(cells, new)
     boundaries = {name: _matching(facets, b, new) for name, b in mesh.boundaries.items()}
     return replace(mesh, points=points, cells=cells, cell_type=new.name, boundaries=boundaries)
@@ -133,8 +134,8 @@ def outer_facets(cells: np.ndarray, cell_type: str, nodes: np.ndarray) -> np.nda
     facets = _facets(cells, element)
     inside = facets[np.isin(facets, nodes).all(axis=1)]
     corners = np.sort(inside[:, : _ncorner(element)], axis=1)
-    _, key, count = np.unique(corners, axis=0, return_inverse=True, return_counts=True)
-    return inside[count[key] == 1]
+    _, key = distinct(corners)
+    return inside[np.bincount(key)[key] == 1]
 
 
 def inner_facets(cells: np.ndarray, cell_type: str) -> tuple[np.ndarray, np.ndarray]:
@@ -153,8 +154,20 @@ def owners(mesh: Mesh, facets: np.ndarray) -> np.ndarray:
     width = _ncorner(mesh.element)
     every = np.sort(_facets(mesh.cells, mesh.element)[:, :width], axis=1)
     keys = np.vstack([every, np.sort(facets[:, :width], axis=1)])
-    _, first, key = np.unique(keys, axis=0, return_index=True, return_inverse=True)
-    return first[key.ravel()[len(every) :]] // len(mesh.element.facets)
+    first, key = distinct(keys)
+    return first[key[len(every) :]] // len(mesh.element.facets)
+
+
+def distinct(rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Where each distinct row (n, k) of whole numbers from 0 on is first, in their order, and (n,) which each row is.
+
+    Numbers instead of rows are sorted; `numpy.unique` of rows takes five times as long.
+    """
+    first, number = np.zeros(0, int), np.zeros(len(rows), np.int64)
+    for column in rows.T:
+        keys = number * (int(column.max(initial=0)) + 1) + column
+        _, first, number = np.unique(keys, return_index=True, return_inverse=True)
+    return first, number
 
 
 def _read(path: Path) -> meshio.Mesh:
@@ -275,7 +288,7 @@ def _matching(facets: np.ndarray, wanted: np.ndarray, element: ElementType) -> n
     """The elements' own facets that have the same corners as `wanted`, each once."""
     ncorner = _ncorner(element)
     keys = np.vstack([np.sort(wanted[:, :ncorner], axis=1), np.sort(facets[:, :ncorner], axis=1)])
-    _, key = np.unique(keys, axis=0, return_inverse=True)
+    _, key = distinct(keys)
     asked, mine = np.unique(key[: len(wanted)]), key[len(wanted) :]
     found, first = np.unique(mine, return_index=True)
     if not np.isin(asked, found).all():

@@ -15,7 +15,7 @@ from importlib.util import find_spec
 from typing import Any, NamedTuple
 
 import numpy as np
-from scipy.sparse import csr_matrix
+from scipy.sparse import csr_matrix, triu
 from scipy.sparse.linalg import LinearOperator, cg, gmres
 
 from fabfem.fem.linear import LinearSolver, Solution, norm
@@ -76,6 +76,7 @@ class MultigridSolver:
     """
 
     name = "multigrid"
+    triangle = False
 
     def __init__(self, near: Callable[[], Near], direct: LinearSolver, symmetric: bool) -> None:
         self._near, self._direct, self._symmetric = near, direct, symmetric
@@ -94,7 +95,7 @@ class MultigridSolver:
             if answer.ok or not np.isfinite(rhs).all():
                 return answer
             self._handed_on = True
-            self._direct.factor(self._matrix)
+            self._direct.factor(triu(self._matrix, format="csr") if self._direct.triangle else self._matrix)
         return self._direct.solve(rhs)
 
     def _iterated(self, rhs: np.ndarray) -> Solution:

@@ -8,13 +8,13 @@ residual and ρ its fall in the last correction, old factors leave about ρ r, n
 """
 
 from collections.abc import Callable, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.sparse import csr_matrix
 
-from fabfem.fem.assembly import stiffness
 from fabfem.fem.diagnosis import singularity
+from fabfem.fem.linear import whole
 from fabfem.fem.model import Controls, Refusal, elastic_tangents
 from fabfem.fem.trial import Equilibrium, System, Task, Trial, attempt, make_task, work
 
@@ -58,11 +58,14 @@ def solve_increment(
             break
         iterations += 1
         if promise_balance(system.controls, residuals):
+            trial = trial.without_tangent()
             again = _again(system, old, task, trial)
             if again is not None:
                 trial, reused = again, reused + 1
                 continue
-        trial = _corrected(system, old, task, trial)
+            trial = _at(system, old, task, trial)
+        matrix, trial = stiffness_of(system, task, trial.batch.tangent), trial.without_tangent()
+        trial = _corrected(system, old, task, trial, matrix)
     return Solved(trial, iterations, tuple(residuals), reused)
 
 
@@ -81,6 +84,13 @@ def _again(system: System, old: Equilibrium, task: Task, trial: Trial) -> Trial 
     return new if isinstance(new, Trial) and new.norm <= 0.5 * trial.norm else None
 
 
+def _at(system: System, old: Equilibrium, task: Task, trial: Trial) -> Trial:
+    """A trial again, with its tangent."""
+    again = attempt(system, old, task, trial.step)
+    assert isinstance(again, Trial), "points answer the same twice"
+    return again
+
+
 def round_off(system: System, step: np.ndarray) -> float:
     """The out-of-balance force that round-off alone makes; it matters where a body moves without strain."""
     return 1e-14 * system.stiffest * system.space.norm(step)
@@ -95,22 +105,21 @@ def _predicted(system: System, old: Equilibrium, task: Task) -> Trial | Refusal:
     )
 
 
-def _corrected(system: System, old: Equilibrium, task: Task, trial: Trial) -> Trial | Refusal:
-    """The trial that a Newton correction leads to, or one with the elastic tangent where that fails."""
-    return _first_that_works(
-        lambda tangent: _searched(system, old, task, trial, tangent),
-        lambda: trial.batch.tangent,
-        lambda: elastic_tangents(system.zones, trial.batch.states, system.space.npoints),
-    )
+def _corrected(system: System, old: Equilibrium, task: Task, trial: Trial, matrix: csr_matrix) -> Trial | Refusal:
+    """The trial that a correction with a stiffness leads to, or one with the elastic tangent where that fails."""
+
+    def elastic() -> csr_matrix:
+        tangent = elastic_tangents(system.zones, trial.batch.states, system.space.npoints)
+        return stiffness_of(system, task, tangent)
+
+    return _first_that_works(lambda way: _searched(system, old, task, trial, way), lambda: matrix, elastic)
 
 
-def _first_that_works(
-    advance: Callable[[np.ndarray], Trial | Refusal], *tangents: Callable[[], np.ndarray]
-) -> Trial | Refusal:
-    """The first trial that `advance` makes of a tangent, or the first refusal where none works."""
+def _first_that_works(advance: Callable[[Any], Trial | Refusal], *ways: Callable[[], Any]) -> Trial | Refusal:
+    """The first trial that `advance` makes of a tangent or stiffness, or the first refusal where none works."""
     refusals = []
-    for tangent in tangents:
-        result = advance(tangent())
+    for way in ways:
+        result = advance(way())
         if isinstance(result, Trial):
             return result
         refusals.append(result)
@@ -119,21 +128,20 @@ def _first_that_works(
 
 def _extended(system: System, old: Equilibrium, task: Task, tangent: np.ndarray) -> Trial | Refusal:
     """The trial of one linear step from `old` to the new load and held dofs."""
-    matrix = stiffness_of(system, task, tangent)
     start = old.force if task.start is None else task.start
-    rhs = system.constraints.collect(task.load - start - system.space.summed(matrix @ task.motion))
-    correction = solved(system, matrix, rhs)
+    rhs = system.constraints.collect(task.load - start - pushed(system, task, tangent, task.motion))
+    correction = solved(system, stiffness_of(system, task, tangent), rhs)
     if isinstance(correction, Refusal):
         return correction
     return attempt(system, old, task, task.motion + system.constraints.spread(correction))
 
 
-def _searched(system: System, old: Equilibrium, task: Task, trial: Trial, tangent: np.ndarray) -> Trial | Refusal:
+def _searched(system: System, old: Equilibrium, task: Task, trial: Trial, matrix: csr_matrix) -> Trial | Refusal:
     """The trial of one correction, shortened while the points refuse it, it overshoots or the residual rises too much.
 
     Where shortening does not end that, the trial with the smallest residual, unless it rises too much.
     """
-    correction = solved(system, stiffness_of(system, task, tangent), trial.unbalanced)
+    correction = solved(system, matrix, trial.unbalanced)
     if isinstance(correction, Refusal):
         return correction
     along = system.constraints.spread(correction)
@@ -168,28 +176,35 @@ def _least(system: System, trial: Trial, tried: list[Trial | Refusal]) -> Trial 
 
 
 def stiffness_of(system: System, task: Task, tangent: np.ndarray) -> csr_matrix:
-    """The (ndof, ndof) stiffness of a tangent (npoints, 6, 6) and of the viscosity of a task."""
+    """The stiffness of the unknowns for a tangent (npoints, 6, 6), with the viscosity and the water of a task."""
     with system.timer.phase("assembly"):
-        whole = tangent if task.viscous is None else tangent + task.viscous
-        matrix = stiffness(system.space, system.pattern, whole)
-        if task.wet is not None:
-            matrix.data += task.wet.data
-        return matrix
+        return system.reduction.stiffness(_with_viscosity(task, tangent), task.wet)
+
+
+def pushed(system: System, task: Task, tangent: np.ndarray, motion: np.ndarray) -> np.ndarray:
+    """The (ndof,) forces that a motion (ndof,) makes, with the same tangent, viscosity and water."""
+    with system.timer.phase("assembly"):
+        strain = system.space.strain(motion)
+        stress = (_with_viscosity(task, tangent) @ strain[:, :, None])[:, :, 0]
+        force = system.space.internal_force(stress)
+        return force if task.wet is None else force + system.space.summed(task.wet @ motion)
+
+
+def _with_viscosity(task: Task, tangent: np.ndarray) -> np.ndarray:
+    return tangent if task.viscous is None else tangent + task.viscous
 
 
 def solved(system: System, matrix: csr_matrix, rhs: np.ndarray) -> np.ndarray | Refusal:
-    """The unknowns that a force on them moves, under a stiffness (ndof, ndof), or why not."""
+    """The unknowns that a force on them moves, under their stiffness, or why not."""
     ranks = system.space.mesh.ranks
     if not ranks.largest(len(rhs)):  # everything is held
         return rhs
     with system.timer.phase("linear_solve"):
-        reduced = system.reduce(matrix)
-        del matrix  # makes room for the factors where the caller has let go of it too
-        system.solver.factor(reduced)
+        system.solver.factor(matrix)
         solution = system.solver.solve(rhs)
         if solution.ok:
             return solution.x
-        named = singularity(system, reduced) if ranks.size == 1 else ""
+        named = singularity(system, whole(matrix, system.solver.triangle)) if ranks.size == 1 else ""
     return Refusal(named or solution.reason)
 
 

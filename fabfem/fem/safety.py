@@ -22,6 +22,8 @@ from fabfem.fem.newton import Solved, solve_increment
 from fabfem.fem.stages import StrengthSearch
 from fabfem.fem.trial import Equilibrium, System, Trial
 
+SPARED = Solved(Refusal("Newton's method was not tried, as it had failed with the last factor that stands"), 0, ())
+
 
 class Bracket(NamedTuple):
     """The last factor with equilibrium and the first without, where there is one yet."""
@@ -65,6 +67,8 @@ class Search(NamedTuple):
     enough: float
     """Displacement beyond which a steady flow is a failure [length]."""
     tried: tuple[Factor, ...] = ()
+    flowed: bool = False
+    """Whether the last equilibrium was reached by a flow; the next factor then begins with one."""
 
 
 class Try(NamedTuple):
@@ -93,19 +97,20 @@ def through(
     """Yield the equilibria found on the way to the factor of safety, then how the search ended."""
     goal, number = place.stage.goal, place.number
     assert isinstance(goal, StrengthSearch)
-    bracket, start, enough, tried = place.progress or _search(system, goal, now, load)
+    bracket, start, enough, tried, flowed = place.progress or _search(system, goal, now, load)
     cutbacks: tuple[Cutback, ...] = ()
     failed: Try | None = None  # after an equilibrium a search ends with another failure, or with none
     spent = dict(system.timer.spent)
     while not bracket.closed(goal):
         factor = bracket.target(goal, place.stage.strength)
-        new = _attempted(place, system, now, load, factor, enough)
+        new = _attempted(place, system, now, load, factor, enough, flowed)
         stands = new.verdict == EQUILIBRIUM
         bracket = bracket.after(factor, stands)
         tried += (_entry(new, system, start, now),)
         if stands:
             number += 1
-            search = Search(bracket, start, enough, tried)
+            flowed = new.fluent is not None
+            search = Search(bracket, start, enough, tried, flowed)
             reached = _recorded(place, number, new, now, load, cutbacks, system.timer.since(spent), search)
             now, cutbacks, spent = _rest(new, now), (), dict(system.timer.spent)
             yield reached
@@ -126,15 +131,17 @@ def through(
 
 def _search(system: System, goal: StrengthSearch, now: Equilibrium, load: Loading) -> Search:
     """A search that begins."""
-    enough = goal.growth * elastic_displacement(system, now, load.total(1.0))
+    enough = goal.displacement or goal.growth * elastic_displacement(system, now, load.total(1.0))
     return Search(Bracket(None, None, False), now.displacement, enough)
 
 
-def _attempted(place: Place, system: System, now: Equilibrium, load: Loading, factor: float, enough: float) -> Try:
-    """What comes of a factor after the equilibrium `now`."""
+def _attempted(
+    place: Place, system: System, now: Equilibrium, load: Loading, factor: float, enough: float, flowed: bool
+) -> Try:
+    """What comes of a factor after the equilibrium `now`; Newton's method is not tried where that came of a flow."""
     weak = system._replace(zones=weaken(system.zones, factor, place.stage.spared))
     forces = load.total(1.0)
-    answer = solve_increment(weak, now, forces, 1.0)
+    answer = SPARED if flowed else solve_increment(weak, now, forces, 1.0)
     fluent = flow(weak, now, forces, enough) if isinstance(answer.end, Refusal) else None
     return Try(factor, weak, answer, fluent)
 
@@ -168,7 +175,8 @@ def _recorded(
     assert isinstance(goal, StrengthSearch)
     assert trial is not None
     fraction = min((new.factor - place.stage.strength) / (goal.largest - place.stage.strength), 1.0)
-    step = Step(new.answer, fraction, goal.step, load.total(1.0), load.on_soil(1.0), cutbacks)
+    answer = Solved(trial, new.fluent.iterations, new.fluent.residuals) if new.fluent else new.answer
+    step = Step(answer, fraction, goal.step, load.total(1.0), load.on_soil(1.0), cutbacks)
     begun = new.fluent.old if new.fluent and new.verdict != EQUILIBRIUM else now
     whole = trial._replace(step=end.displacement - begun.displacement)
     return increment(place, number, new.system, begun, end, step, whole, dict(timings), search, new.factor, 1.0)

@@ -5,14 +5,14 @@ nothing is raised and nothing that converged is lost. What drives a stage is cho
 without one, the fraction of its loads and motions.
 """
 
-from collections.abc import Generator, Iterator, Mapping
+from collections.abc import Callable, Generator, Iterator, Mapping
 from importlib import import_module
 from importlib.util import find_spec
 from typing import NamedTuple
 
 import numpy as np
 
-from fabfem.fem.assembly import Pattern, find_pattern, stiffness
+from fabfem.fem.assembly import Pattern, diagonal, find_pattern
 from fabfem.fem.increment import (
     Collapsed,
     Cutback,
@@ -30,7 +30,7 @@ from fabfem.fem.model import Controls, Model, Refusal, Zone, elastic_tangents, s
 from fabfem.fem.multigrid import MultigridSolver, Near, near, worth_while
 from fabfem.fem.newton import solve_increment
 from fabfem.fem.pores import Flowed, Pace, PorousSpace, Water, water_of
-from fabfem.fem.reduction import Reduction, reduction
+from fabfem.fem.reduction import Reduction
 from fabfem.fem.space import Space
 from fabfem.fem.stages import ArcLength, DisplacementControl, Stage, StrengthSearch
 from fabfem.fem.start import Start, misfit
@@ -79,15 +79,15 @@ def march(model: Model, start: Start | None = None) -> Iterator[Increment | Stop
 def systems_of(model: Model) -> list[System]:
     """The equations of every stage; raises ValueError where a stage is impossible."""
     space = model.space
-    pattern = find_pattern(space.dofs, space.ndof)
-    elastic = stiffness(space, pattern, elastic_tangents(model.zones, model.states, space.npoints))
-    stiffest = space.mesh.ranks.largest(float(np.abs(space.summed(elastic.diagonal())).max()))
-    shared = (pattern, Timer(PHASES), stiffest)
+    elastic = diagonal(space, elastic_tangents(model.zones, model.states, space.npoints))
+    stiffest = space.mesh.ranks.largest(float(np.abs(space.summed(elastic)).max()))
+    coupled = model.water is not None or any(stage.bodies for stage in model.stages)
+    shared = (find_pattern(space.dofs, space.ndof) if coupled else None, Timer(PHASES), stiffest)
     zones: Mapping[str, Zone] = model.zones
     systems: list[System] = []
     for stage in model.stages:
         zones = changed(zones, stage)
-        systems.append(_system(model, stage, zones, *shared))
+        systems.append(_system(model, stage, zones, [system.reduction for system in systems], *shared))
     return systems
 
 
@@ -119,27 +119,41 @@ def absent_dofs(space: Space, absent: Mapping[str, Zone]) -> np.ndarray:
 
 
 def _system(
-    model: Model, stage: Stage, zones: Mapping[str, Zone], pattern: Pattern, timer: Timer, stiffest: float
+    model: Model,
+    stage: Stage,
+    zones: Mapping[str, Zone],
+    known: list[Reduction],
+    pattern: Pattern | None,
+    timer: Timer,
+    stiffest: float,
 ) -> System:
+    """The equations of a stage; it shares the pattern of an earlier one with the same unknowns, one of `known`."""
     gone = absent_dofs(model.space, {name: zones[name] for name in stage.absent})
     water = _water(model, stage, pattern)
     if isinstance(model.space, PorousSpace) and water is None:
         gone = np.union1d(gone, np.arange(model.space.nmotion, model.space.ndof))
     constraints = constrain(model.space, stage.supports, stage.bodies, gone)
-    reduce = reduction(pattern, constraints)
     there = {name: zone for name, zone in zones.items() if name not in stage.absent}
     if not isinstance(stage.goal, StrengthSearch):
         there = weaken(there, stage.strength, stage.spared)
     solver = model.space.mesh.ranks.solver(constraints, model.space)
-    solver = solver or _solver(model, there, constraints, pattern, reduce)
+
+    def elastic() -> Near:
+        tangent = elastic_tangents(there, model.states, model.space.npoints)
+        return near(model.space, constraints, reduction.stiffness(tangent))
+
+    solver = solver or _solver(model, there, constraints, elastic)
+    direct = water is None and not constraints.ties.shape[1]
+    mine = Reduction(model.space, constraints, solver.triangle, None if direct else pattern)
+    reduction = next((one for one in known if one.same(mine)), mine)
     counted = balanced(model.space, constraints, water)
     return System(
-        *(model.space, there, model.controls, constraints, pattern, reduce, solver, timer, stiffest, water, counted)
+        *(model.space, there, model.controls, constraints, reduction, solver, timer, stiffest, water, counted)
     )
 
 
 def _solver(
-    model: Model, zones: Mapping[str, Zone], constraints: Constraints, pattern: Pattern, reduce: Reduction
+    model: Model, zones: Mapping[str, Zone], constraints: Constraints, elastic: Callable[[], Near]
 ) -> LinearSolver:
     """The linear solver of a stage: a direct one, or multigrid where that is asked for or worth while."""
     usual = model.water is None and worth_while(model.space, constraints)
@@ -149,16 +163,14 @@ def _solver(
         reason = "not for pore water" if model.water else "not installed; pip install pyamg brings it"
         raise ValueError(f"the linear solver 'multigrid' is {reason}.")
 
-    def elastic() -> Near:
-        tangent = elastic_tangents(zones, model.states, model.space.npoints)
-        return near(model.space, constraints, reduce(stiffness(model.space, pattern, tangent)))
-
     return MultigridSolver(elastic, make_solver("auto", symmetric(zones)), symmetric(zones))
 
 
-def _water(model: Model, stage: Stage, pattern: Pattern) -> Water | None:
+def _water(model: Model, stage: Stage, pattern: Pattern | None) -> Water | None:
     """What pore water does in a stage; None where there is none, or its excess pressure is zero."""
-    if model.water is None or not isinstance(model.space, PorousSpace) or stage.drainage == "drained":
+    if pattern is None or model.water is None or not isinstance(model.space, PorousSpace):
+        return None
+    if stage.drainage == "drained":
         return None
     return water_of(model.space, pattern, model.water, stage.drainage == "seepage", stage.duration)
 
@@ -168,7 +180,9 @@ def _all_stages(model: Model, systems: list[System], start: Start | None) -> Ite
     now = Equilibrium(np.zeros(space.ndof), model.states, np.zeros(space.ndof), np.zeros((0, 6, 6)))
     number, time = (start.number, start.time) if start else (0, 0.0)
     done = start.stage_index if start else 0
-    for index, (stage, system) in enumerate(zip(model.stages[done:], systems[done:], strict=True), done):
+    del systems[:done]
+    for index, stage in enumerate(model.stages[done:], done):
+        system = systems.pop(0)  # what it holds goes with the stage: pattern, solver, factors
         if start and index == done:
             now, place = start.now, Place(stage, index, number, time, start.origin, start.progress)
         else:

@@ -33,17 +33,22 @@ class StrengthSearch:
         Width of the bracket at which it ends.
     growth : float
         Displacement at which a flow counts as failure, over that of the elastic body under the same loads.
+    displacement : float or None
+        The same displacement itself [length]; `growth` then has no say.
     """
 
     step: float = 0.1
     largest: float = 10.0
     tolerance: float = 0.01
     growth: float = 10.0
+    displacement: float | None = None
 
     def __post_init__(self) -> None:
         """Refuse a search that cannot end."""
         if not 0.0 < self.tolerance <= self.step or self.growth <= 0.0:
             raise ValueError("a search for the factor of safety needs 0 < tolerance <= step and growth > 0.")
+        if self.displacement is not None and self.displacement <= 0.0:
+            raise ValueError("a search for the factor of safety needs a displacement > 0, or none.")
 
 
 @dataclass(frozen=True)

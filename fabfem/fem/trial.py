@@ -10,7 +10,6 @@ from typing import NamedTuple
 import numpy as np
 from scipy.sparse import csr_matrix
 
-from fabfem.fem.assembly import Pattern
 from fabfem.fem.linear import LinearSolver
 from fabfem.fem.model import Batch, Controls, Refusal, States, Zone, elastic_tangents, update_points
 from fabfem.fem.pores import Water
@@ -29,8 +28,7 @@ class System(NamedTuple):
     zones: Mapping[str, Zone]
     controls: Controls
     constraints: Constraints
-    pattern: Pattern
-    reduce: Reduction
+    reduction: Reduction
     solver: LinearSolver
     timer: Timer
     stiffest: float
@@ -64,7 +62,7 @@ class Task(NamedTuple):
     start: np.ndarray | None = None
     """(ndof,) internal force at its start, where that is not the skeleton's alone."""
     wet: csr_matrix | None = None
-    """What water adds to the stiffness."""
+    """What water adds to the stiffness of all dofs."""
 
 
 class Trial(NamedTuple):
@@ -89,6 +87,10 @@ class Trial(NamedTuple):
     def skeleton(self) -> np.ndarray:
         """(ndof,) internal force of the skeleton, without drag."""
         return self.force - self.drag - self.water
+
+    def without_tangent(self) -> "Trial":
+        """The trial where its tangent, which is large, is not needed any more."""
+        return self._replace(batch=self.batch._replace(tangent=np.zeros((0, 6, 6))))
 
 
 def make_task(system: System, old: Equilibrium, load: np.ndarray, size: float) -> Task:

@@ -9,10 +9,10 @@ import base64
 import struct
 import zlib
 from collections.abc import Iterator, Mapping, Sequence
+from html import escape  # xml.sax.saxutils loads all of urllib and ssl
 from pathlib import Path
 from typing import Any, NamedTuple
 from xml.etree import ElementTree
-from xml.sax.saxutils import quoteattr
 
 import numpy as np
 from numpy.typing import NDArray
@@ -196,7 +196,8 @@ def _head(name: str, values: NDArray[np.generic], prefix: str = "", more: Mappin
         **{f"ComponentName{i}": part for i, part in enumerate(_component_names(width))},
         **more,
     }
-    return f"<{prefix}DataArray {' '.join(f'{key}={quoteattr(text)}' for key, text in attributes.items())}"
+    said = " ".join(f'{key}="{escape(text)}"' for key, text in attributes.items())
+    return f"<{prefix}DataArray {said}"
 
 
 def _array(name: str, values: NDArray[np.generic], tuples: bool = False) -> str:

@@ -74,6 +74,8 @@ class Settings(NamedTuple):
 class PetscSolver:
     """A linear solver with the interface of `fabfem.fem.linear.LinearSolver` on the unknowns of a rank."""
 
+    triangle = False
+
     def __init__(
         self, comm: MPI.Comm, constraints: Constraints, space: Space, settings: Settings, spent: dict[str, float]
     ) -> None:

@@ -12,13 +12,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fabfem.fem.assembly import find_pattern, stiffness
 from fabfem.fem.box import box_mesh
 from fabfem.fem.elements import ELEMENTS
 from fabfem.fem.kinematics import KINEMATICS, Kinematics
 from fabfem.fem.linear import make_solver
 from fabfem.fem.mesh import Mesh, quadratic
-from fabfem.fem.reduction import reduction
+from fabfem.fem.reduction import Reduction
 from fabfem.fem.space import Space, build_space
 from fabfem.fem.supports import Constraints
 from fabfem.verification.row import Row
@@ -91,9 +90,8 @@ def _mesh(cell_type: str, cells: int) -> Mesh:
 
 def _solution(space: Space, sharp: Space) -> np.ndarray:
     """The (ndof,) displacement under the body force, integrated with the rule of `sharp`."""
-    pattern = find_pattern(space.dofs, space.ndof)
     state = initial_state(MATERIAL, None, np.zeros((space.npoints, 6)))
-    matrix = stiffness(space, pattern, elastic_tangent(MATERIAL, state))
+    tangent = elastic_tangent(MATERIAL, state)
     u = _field(space.mesh.points, space.kinematics)[0].ravel()
     edge = np.unique(np.concatenate([facets.ravel() for facets in space.mesh.boundaries.values()]))
     ncomp = len(space.components)
@@ -101,11 +99,11 @@ def _solution(space: Space, sharp: Space) -> np.ndarray:
     free = np.setdiff1d(np.arange(space.ndof), held)
     given = np.zeros(space.ndof)
     given[held] = u[held]
-    solver = make_solver(symmetric=True)
-    solver.factor(
-        reduction(pattern, Constraints(free, np.zeros(space.ndof), np.zeros(0, int), np.zeros((0, 0))))(matrix)
-    )
-    given[free] = solver.solve((_body_force(sharp) - matrix @ given)[free]).x
+    moved = space.internal_force((tangent @ space.strain(given)[:, :, None])[:, :, 0])
+    solver, none = make_solver(symmetric=True), np.zeros(0, int)
+    constraints = Constraints(free, np.zeros(space.ndof), none, np.zeros((0, 0)))
+    solver.factor(Reduction(space, constraints, solver.triangle).stiffness(tangent))
+    given[free] = solver.solve((_body_force(sharp) - moved)[free]).x
     return given
 
 

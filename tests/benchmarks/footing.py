@@ -66,6 +66,7 @@ def solve(cells: tuple[int, ...], material: str, solver: str, increments: int = 
             break
         iterations, reused = iterations + step.iterations, reused + getattr(step, "reused", 0)
         settlement = -float(step.displacement[centre(model.space)])
+        del step  # two states and a tangent of all points
     wall = time.perf_counter() - begin
     phases["other"] = clock() - start - sum(phases.values())
     return Ran(

@@ -18,7 +18,7 @@ from fabfem.fem.assembly import find_pattern, stiffness
 from fabfem.fem.box import box_mesh
 from fabfem.fem.kinematics import KINEMATICS
 from fabfem.fem.linear import make_solver, norm
-from fabfem.fem.reduction import reduction
+from fabfem.fem.reduction import Reduction
 from fabfem.fem.space import Space, build_space
 from fabfem.fem.supports import Support, constrain
 from umat import Elastic, elastic_tangent, initial_state
@@ -64,7 +64,7 @@ def main() -> None:
     print(f"| stiffness on the fixed pattern | {fast:.4f} | 1 |")
     print(f"| the same by scikit-fem's form | {slow:.4f} | {slow / fast:.0f} |")
     constraints = constrain(space, (Support("bottom", "x"), Support("bottom", "y")))
-    matrix = reduction(pattern, constraints)(ours)
+    matrix = Reduction(space, constraints).stiffness(tangent)
     rhs = np.random.default_rng(1).normal(size=matrix.shape[0])
     for name in ("superlu", "pardiso"):
         if name == "pardiso" and find_spec("pypardiso") is None:

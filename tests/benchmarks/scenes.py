@@ -6,7 +6,7 @@ tests/benchmarks/scenes.py``. A scene whose sweep has not run is passed over.
 
 import csv
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 
 import matplotlib.pyplot as plt
@@ -20,6 +20,9 @@ SLIP = 0.02, 0.04
 """Shear strain at which the averages of the hollow cylinder are compared [-]."""
 SETTLED = 0.01, 0.025, 0.05
 """Settlement over B at which the footings are compared [-]."""
+
+WEAKENED = 1.2, 1.5
+"""Factors on the strength at which the slopes are compared."""
 
 
 def rows(name: str) -> Rows:
@@ -145,7 +148,7 @@ def bands(name: str) -> None:
     """Draw the axial strain at the end, a row of meshes for each viscosity."""
     runs = {(row["viscosity"], row["cells"]): row["folder"] for row in rows(name)}
     ranks = [list(dict.fromkeys(key[place] for key in runs)) for place in (0, 1)]
-    figure, grid = plt.subplots(len(ranks[0]), len(ranks[1]), figsize=(5.5, 6.5), squeeze=False)
+    figure, grid = plt.subplots(len(ranks[0]), len(ranks[1]), figsize=(6.0, 2.3 * len(ranks[0])), squeeze=False)
     for (viscosity, cells), folder in runs.items():
         axes = grid[ranks[0].index(viscosity), ranks[1].index(cells)]
         file = max((HOME / "results" / f"{name}_sweep" / folder).glob("fields_*.vtu"))
@@ -162,6 +165,48 @@ def bands(name: str) -> None:
     figure.savefig(HOME / "docs" / f"scenes_{name}.png", dpi=100, bbox_inches="tight")
 
 
+def slope(name: str) -> None:
+    """Print the factor of safety against the angle of bedding, draw the displacement curves and the mechanisms."""
+    folders = dict.fromkeys((row["bedding_angle"], row["folder"]) for row in rows(name))
+    figure, axes = plt.subplots(figsize=(5.5, 3.4))
+    for (angle, folder), style in zip(folders, "os^D", strict=True):
+        at = HOME / "results" / f"{name}_sweep" / folder
+        said = json.loads((at / "report.json").read_text(encoding="utf-8"))["factor_of_safety"]
+        tried = said["tried"]
+        stands = np.array(
+            sorted((one["factor"], one["displacement"]) for one in tried if one["verdict"] == "equilibrium")
+        )
+        fails = np.array([(one["factor"], one["displacement"]) for one in tried if one["verdict"] == "collapse"])
+        reached = " | ".join(f"{1000 * np.interp(factor, *stands.T):.0f}" for factor in WEAKENED)
+        print(
+            f"| {angle} | {said['last_equilibrium']:.4g} … {said['first_failure']:.4g} | {reached} | "
+            f"{1000 * stands[-1, 1]:.0f} | {said['reason']} |"
+        )
+        (line,) = axes.plot(stands[:, 1], stands[:, 0], f"-{style}", markersize=4, label=f"{angle}°")
+        axes.plot(fails[:, 1], fails[:, 0], style, markersize=5, color=line.get_color(), fillstyle="none")
+    axes.set(xlabel="largest displacement [m]; hollow: flow that was ended", ylabel="factor on the strength")
+    axes.legend(title="bedding")
+    save(figure, f"scenes_{name}")
+    mechanisms(name, folders)
+
+
+def mechanisms(name: str, folders: Iterable[tuple[str, str]]) -> None:
+    """Draw the shear strain of the last increment of the flow at the first failure, over its largest."""
+    figure, grid = plt.subplots(2, 2, figsize=(7.5, 4.0), layout="constrained")
+    for axes, (angle, folder) in zip(grid.flat, folders, strict=True):
+        mesh = meshio.read(max((HOME / "results" / f"{name}_sweep" / folder).glob("fields_*.vtu")))
+        strain = mesh.cell_data["strain_increment"][0]
+        strain = strain - strain[:, :3].mean(axis=1)[:, None] * [1, 1, 1, 0, 0, 0]
+        shear = np.sqrt((strain[:, :3] ** 2).sum(axis=1) + 2.0 * (strain[:, 3:] ** 2).sum(axis=1))
+        drawn = PolyCollection(list(mesh.points[mesh.cells[0].data[:, :4], :2]), array=shear / shear.max())
+        axes.add_collection(drawn)
+        axes.autoscale()
+        axes.set(aspect="equal", title=f"bedding {angle}°")
+        axes.set_axis_off()
+    figure.colorbar(drawn, ax=grid, label="shear strain increment over its largest", shrink=0.8)
+    figure.savefig(HOME / "docs" / f"scenes_{name}_mechanism.png", dpi=90)
+
+
 def save(figure: plt.Figure, name: str) -> None:
     """Write a picture of the documentation."""
     figure.tight_layout()
@@ -173,6 +218,9 @@ SCENES: dict[str, Callable[[str], None]] = {
     "torsion": hollow_cylinder,
     "triaxial_rough": triaxial,
     "biaxial_band": biaxial,
+    "toyoura_bedding": slope,
+    "toyoura_crest_load": slope,
+    "toyoura_setback_load": slope,
 }
 """What is made of the sweep of each scene."""
 

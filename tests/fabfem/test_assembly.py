@@ -5,11 +5,14 @@ import pytest
 import skfem
 from scipy.sparse import csr_matrix
 
-from fabfem.fem.assembly import find_pattern, stiffness
+from fabfem.fem.assembly import diagonal, find_pattern, stiffness
 from fabfem.fem.box import box_mesh
 from fabfem.fem.kinematics import KINEMATICS
+from fabfem.fem.linear import whole as mirrored
 from fabfem.fem.loads import Gravity, Pressure, Traction, nodal_force
+from fabfem.fem.reduction import Reduction
 from fabfem.fem.space import Space, build_space
+from fabfem.fem.supports import Constraints, RigidBody, Support, constrain
 from umat.mandel import from_tensor
 
 FORMS = {
@@ -87,6 +90,37 @@ def test_stiffness_equals_that_of_a_form(name: str) -> None:
     expected = csr_matrix((theirs.data, (to_ours[theirs.row], to_ours[theirs.col])), shape=theirs.shape)
     got = stiffness(space, find_pattern(space.dofs, space.ndof), tangent)
     assert abs(got - expected).max() < 1e-12 * abs(expected).max()
+
+
+def spread(constraints: Constraints, ndof: int) -> np.ndarray:
+    """The matrix T of u = T v, a column for each unknown."""
+    return np.stack([constraints.spread(unit) for unit in np.eye(constraints.nunknowns)], axis=1).reshape(ndof, -1)
+
+
+@pytest.mark.parametrize("triangle", [False, True])
+@pytest.mark.parametrize("bodies", [(), (RigidBody("top", ("x", "y"), (1.0, 1.0)),)], ids=["free", "rigid body"])
+@pytest.mark.parametrize("name", ["triangle6", "quad8"])
+def test_the_stiffness_of_the_unknowns_is_that_of_all_dofs_reduced(name: str, bodies: tuple, triangle: bool) -> None:
+    space, _ = case(name)
+    tangent = np.random.default_rng(5).uniform(-1.0, 1.0, (space.npoints, 6, 6))
+    tangent = tangent + tangent.transpose(0, 2, 1) if triangle else tangent
+    held = [Support("bottom", "x"), Support("bottom", "y"), Support("left", "x")]
+    constraints = constrain(space, held[:2] if bodies else held, bodies)
+    pattern = find_pattern(space.dofs, space.ndof)
+    whole = stiffness(space, pattern, tangent).toarray()
+    transfer = spread(constraints, space.ndof)
+    expected = transfer.T @ whole @ transfer
+    size = np.abs(expected).max()
+    kinds = [Reduction(space, constraints, triangle, pattern)]
+    kinds += [] if bodies else [Reduction(space, constraints, triangle)]
+    for reduction in kinds:
+        got = reduction.stiffness(tangent)
+        assert got.has_canonical_format
+        np.testing.assert_allclose(got.toarray(), np.triu(expected) if triangle else expected, atol=1e-13 * size)
+        np.testing.assert_allclose(mirrored(got, triangle).toarray(), expected, atol=1e-13 * size)
+    np.testing.assert_allclose(diagonal(space, tangent), whole.diagonal(), atol=1e-13 * size)
+    assert kinds[0].same(Reduction(space, constrain(space, held[:2] if bodies else held, bodies), triangle, pattern))
+    assert not kinds[0].same(Reduction(space, constraints, not triangle, pattern))
 
 
 @pytest.mark.parametrize("name", FORMS)

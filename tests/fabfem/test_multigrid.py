@@ -8,14 +8,14 @@ import pytest
 from scipy.sparse import csr_matrix, diags
 
 from fabfem.fem import multigrid
-from fabfem.fem.assembly import find_pattern, stiffness
+from fabfem.fem.assembly import find_pattern
 from fabfem.fem.box import box_mesh
 from fabfem.fem.kinematics import KINEMATICS
 from fabfem.fem.linear import make_solver
 from fabfem.fem.loads import Pressure
 from fabfem.fem.model import Controls, Model, Zone
 from fabfem.fem.multigrid import MultigridSolver, near, worth_while
-from fabfem.fem.reduction import reduction
+from fabfem.fem.reduction import Reduction
 from fabfem.fem.solve import march
 from fabfem.fem.space import Space, build_space
 from fabfem.fem.stages import Stage
@@ -49,10 +49,11 @@ def solver_and_matrix(name: str) -> tuple[MultigridSolver, csr_matrix]:
     """The solver of a scene and its elastic stiffness."""
     cells, counts, kinematics, supports, bodies = SCENES[name]
     space = space_of(cells, counts, kinematics)
-    pattern, constraints = find_pattern(space.dofs, space.ndof), constrain(space, supports, bodies)
+    constraints = constrain(space, supports, bodies)
     elastic = Elastic(1e4, 0.3)
     tangent = elastic_tangent(elastic, initial_state(elastic, None, np.zeros((space.npoints, 6))))
-    matrix = reduction(pattern, constraints)(stiffness(space, pattern, tangent))
+    pattern = find_pattern(space.dofs, space.ndof) if bodies else None
+    matrix = Reduction(space, constraints, whole=pattern).stiffness(tangent)
     return MultigridSolver(lambda: near(space, constraints, matrix), make_solver("superlu"), symmetric=True), matrix
 
 

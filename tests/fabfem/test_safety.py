@@ -18,7 +18,9 @@ from fabfem.fem.stages import Stage, StrengthSearch
 from fabfem.fem.supports import Support
 from umat import DruckerPrager, Elastic, MohrCoulomb, VonMises, initial_state, weakened
 from umat.chang_hicher import ChangHicher
+from umat.directions import directions
 from umat.drucker_prager import matched_to_mohr_coulomb
+from umat.sands import toyoura
 
 HELD = (Support("bottom", "y"), Support("left", "x"))
 LOAD = 30.0
@@ -101,6 +103,61 @@ def test_an_iteration_that_gives_up_is_no_failure() -> None:
         (sure.last_equilibrium, sure.first_failure), abs=0.011
     )
     assert end.verdict == "collapse"
+
+
+@pytest.mark.parametrize("displacement", [0.005, 0.5])
+def test_a_displacement_that_is_named_changes_no_bracket(displacement: float) -> None:
+    material = MATERIALS["Mohr-Coulomb"]
+    exact = brentq(lambda factor: strength(weakened(material, factor)) - LOAD, 1.0, 5.0)
+    _, end = search(material, tolerance=0.002, displacement=displacement)
+    assert end.verdict == "collapse", end.reason
+    assert end.last_equilibrium - 1e-6 <= exact <= end.first_failure + 1e-6
+    assert end.failing is not None
+    assert f"a displacement of {end.failing.moved:.3g}" not in end.reason  # the last increment is not all of the flow
+    assert float(end.reason.split("displacement of ")[1].split()[0]) > displacement
+
+
+SAND = toyoura()
+CELL, AXIAL = 50.0, 130.0
+"""Pressure on the side of a block of sand and on its top [kPa]."""
+
+
+def sand_block(*stages: Stage, controls: Controls) -> list[Any]:
+    """March a block of Toyoura sand (e = 0.8, level bedding) in plane strain through stages after 50 kPa all round."""
+    space = build_space(box_mesh("quad8", (1, 1), (0.0, 0.0), (1.0, 1.0)), KINEMATICS["plane_strain"])
+    stress = np.tile([CELL, CELL, CELL, 0.0, 0.0, 0.0], (space.npoints, 1))
+    needs = {"void_ratio": 0.8, "fabric": [-0.0849, 0.1698, -0.0849, 0.0, 0.0, 0.0]}
+    rule = directions("bazant_oh_37")
+    zone = Zone(SAND, rule, initial_state(SAND, rule, stress, **needs), slice(None))
+    return list(march(Model(space, {"all": zone}, stages, controls)))
+
+
+def peak_pressure(factor: float) -> float:
+    """Largest pressure [kPa] on the top of the block of sand under way to 20 % of strain, its strength divided."""
+    side = Pressure("right", CELL, 1.0, 1.0)
+    pushed = (*HELD, Support("top", "y", -0.2))
+    steps = sand_block(
+        Stage("compression", pushed, (side,), first=0.01, largest=0.02, strength=factor),
+        controls=Controls(tolerance=1e-4),
+    )
+    assert steps[-1].fraction == 1.0
+    return max(float(step.states["all"].stress[:, 1].mean()) for step in steps)
+
+
+def test_sand_fails_where_its_peak_is_below_the_load() -> None:
+    """The peak of sand that is weak from the start differs a little from that of sand which grows weaker under load."""
+    side, top = Pressure("right", CELL, 1.0, 1.0), Pressure("top", AXIAL, CELL / AXIAL, 1.0)
+    goal = StrengthSearch(step=0.1, tolerance=0.05, displacement=0.05)
+    *steps, end = sand_block(
+        Stage("load", HELD, (side, top), first=0.1, largest=0.1),
+        Stage("search", HELD, (side, replace(top, start=1.0)), goal=goal),
+        controls=Controls(tolerance=1e-3, max_iterations=6),
+    )
+    assert end.verdict == "collapse", end.reason
+    assert "the body flows" in end.reason
+    assert peak_pressure(end.last_equilibrium) > 0.99 * AXIAL > peak_pressure(end.first_failure)
+    assert end.first_failure - end.last_equilibrium <= 0.0500001
+    assert all(step.residuals[-1] <= 1e-3 for step in steps)
 
 
 def test_a_body_that_fails_at_the_first_factor_has_no_equilibrium_to_show() -> None:

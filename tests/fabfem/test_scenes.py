@@ -3,6 +3,7 @@
 The numbers were measured with these settings; they guard the scenes against change, and are no answers of their own.
 """
 
+import json
 from pathlib import Path
 from typing import Any
 
@@ -67,6 +68,18 @@ SCENES = [
         1e-3,
     ),
     (
+        "specimen/biaxial_bedding.toml",
+        {
+            "material.sand.fabric.bedding_angle": 90.0,
+            "mesh.box.cells": [2, 4],
+            "stage[shear].displacement": [{"boundary": "top", "x": 0.0, "y": -0.0004}],
+            "stage[shear].increments": {"initial": 0.25, "maximum": 0.25},
+        },
+        "q",
+        83.0,
+        1e-3,
+    ),
+    (
         "hollow_cylinder/torsion.toml",
         {"stage[shear].control.change": 0.0002, "stage[shear].increments": {"initial": 0.1, "maximum": 0.1}},
         "hgs_tau",
@@ -89,6 +102,22 @@ def test_a_scene_in_small_gives_what_was_measured(
 ) -> None:
     history = small(path, settings, tmp_path / "out")
     assert float(history[column][-1]) == pytest.approx(measured, rel=within)
+
+
+def test_a_slope_in_sand_with_inclined_bedding_flows_in_the_end(tmp_path: Path) -> None:
+    """In steps five times as large as the case's, the search brackets its answer, 1.95 to 1.975, and moves as far."""
+    settings = {
+        "material.sand.fabric.bedding_angle": 30.0,
+        "stage[safety].step": 0.5,
+        "stage[safety].tolerance": 0.5,
+        "stage[safety].failure_displacement": 0.3,
+    }
+    small("slope/toyoura_bedding.toml", settings, tmp_path / "out")
+    found = json.loads((tmp_path / "out" / "report.json").read_text())["factor_of_safety"]
+    assert (found["last_equilibrium"], found["first_failure"]) == (1.5, 2.0)
+    assert found["verdict"] == "collapse"
+    assert "the body flows" in found["reason"]
+    assert [round(one["displacement"], 2) for one in found["tried"]][1] == pytest.approx(0.14, abs=0.011)
 
 
 def test_a_crest_load_settles_the_slope_of_an_abaqus_mesh(tmp_path: Path) -> None:
@@ -122,6 +151,12 @@ def test_a_ring_without_torque_is_the_element_test(tmp_path: Path) -> None:
     for way in ("hgs", "mean"):
         assert float(ring[f"{way}_sigma_z"][-1]) == pytest.approx(float(point["stress_zz"][-1]), rel=3e-3)
     assert float(ring["deviation_q"][-1]) < 0.01 * float(ring["mean_q"][-1])
+
+
+def test_a_circular_footing_on_clay_carries_the_exact_load(tmp_path: Path) -> None:
+    pytest.importorskip("gmsh")
+    history = small("footing/circular_clay.toml", {}, tmp_path / "out")
+    assert float(history["q/c"][-1]) == pytest.approx(6.05, rel=0.02)  # [Eason & Shield 1960]
 
 
 def test_inclined_bedding_pushes_a_guided_footing_sideways(tmp_path: Path) -> None:

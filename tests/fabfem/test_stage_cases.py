@@ -255,6 +255,14 @@ BAD = {
         '[[stage]]\nname = "s"\nkind = "strength_reduction"\nstep = 0.01\ntolerance = 0.1\n',
         "stage[s]: a search for the factor of safety needs 0 < tolerance <= step",
     ),
+    "two limits of a flow": (
+        '[[stage]]\nname = "s"\nkind = "strength_reduction"\ngrowth = 5.0\nfailure_displacement = 0.1\n',
+        "growth and failure_displacement say the same thing in two ways",
+    ),
+    "a negative limit of a flow": (
+        '[[stage]]\nname = "s"\nkind = "strength_reduction"\nfailure_displacement = -0.1\n',
+        "stage[s].failure_displacement: must be",
+    ),
 }
 
 

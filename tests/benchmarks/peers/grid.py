@@ -3,6 +3,7 @@
 Squares cut along alternating diagonals, and the return to von Mises' cylinder with linear hardening; tension positive.
 """
 
+import itertools
 import json
 import os
 import resource
@@ -10,6 +11,7 @@ import resource
 import numpy as np
 
 CUTS = {"5k": 1, "20k": 2, "81k": 4, "300k": 8}
+SOLIDS = {"solid-50k": (15, 15, 9), "solid-150k": (20, 20, 15)}
 YOUNG, POISSON, YIELD, HARDENING, PRESSURE = 1e4, 0.3, 10.0 * 3.0**0.5, 100.0, 50.0
 SHEAR, BULK = YOUNG / 2.0 / (1.0 + POISSON), YOUNG / 3.0 / (1.0 - 2.0 * POISSON)
 
@@ -27,36 +29,59 @@ def triangles(cuts: int) -> tuple[np.ndarray, np.ndarray]:
     return np.stack([x.ravel(), y.ravel()], axis=1), cells
 
 
-def returned(stress: np.ndarray, plastic: np.ndarray, strain: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return stress, plastic strain and in-plane tangent (n, 3, 3) after strain increments (n, 3).
+def tetrahedra(counts: tuple[int, ...]) -> tuple[np.ndarray, np.ndarray]:
+    """Return points (n, 3) of the box 5 × 5 × 3 m and corners (nel, 4), six to a cell about its long diagonal."""
+    axes = [np.linspace(*ends, n + 1) for ends, n in zip(((0.0, 5.0), (0.0, 5.0), (-3.0, 0.0)), counts, strict=True)]
+    points = np.stack([x.ravel(order="F") for x in np.meshgrid(*axes, indexing="ij")], axis=1)
+    strides = np.cumprod([1, *(n + 1 for n in counts[:-1])])
+    first = sum(
+        (number * stride for number, stride in zip(np.meshgrid(*map(np.arange, counts)), strides, strict=True)),
+        start=np.zeros((), int),
+    )
+    paths = np.array([np.cumsum([0, *strides[list(order)]]) for order in itertools.permutations(range(3))])
+    return points, (first.reshape(-1, 1, 1) + paths).reshape(-1, 4)
 
-    Stress is (n, 4): xx, yy, zz, xy; strain xx, yy, xy, the shear doubled.
+
+def returned(stress: np.ndarray, plastic: np.ndarray, strain: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return stress, plastic strain and tangent (n, k, k) after strain increments (n, k), shears doubled.
+
+    Stress is (n, 4): xx, yy, zz, xy with strain xx, yy, xy in plane strain; (n, 6): xx, yy, zz, xy, xz, yz in solids.
     """
-    unit = np.array([1.0, 1.0, 1.0, 0.0])
-    volume = strain[:, 0] + strain[:, 1]
-    full = np.stack([strain[:, 0], strain[:, 1], 0.0 * volume, 0.5 * strain[:, 2]], axis=1)
+    size = stress.shape[1]
+    kept = [0, 1, 3] if size == 4 else list(range(6))
+    unit, twice = np.repeat([1.0, 0.0], [3, size - 3]), np.repeat([1.0, 2.0], [3, size - 3])
+    full = np.zeros(stress.shape)
+    full[:, kept] = strain / twice[kept]
+    volume = full[:, :3].sum(axis=1)
     trial = stress + 2.0 * SHEAR * full + ((BULK - 2.0 / 3.0 * SHEAR) * volume)[:, None] * unit
     deviator = trial - trial[:, :3].mean(axis=1)[:, None] * unit
-    size = np.sqrt(deviator**2 @ np.array([1.0, 1.0, 1.0, 2.0]))
-    q = np.sqrt(1.5) * size
+    length = np.sqrt(deviator**2 @ twice)
+    q = np.sqrt(1.5) * length
     excess = q - YIELD - HARDENING * plastic
     excess[excess < 1e-9 * YIELD] = 0.0  # or round-off would decide which points begin an increment as plastic
     slip = np.maximum(excess, 0.0) / (3.0 * SHEAR + HARDENING)
     shrink = 1.0 - 3.0 * SHEAR * slip / np.maximum(q, 1e-300)
     new = trial - (1.0 - shrink)[:, None] * deviator
-    normal = (deviator / np.maximum(size, 1e-300)[:, None])[:, [0, 1, 3]]
-    one = unit[[0, 1, 3]]
-    elastic = BULK * np.outer(one, one) + 2.0 * SHEAR * (np.diag([1.0, 1.0, 0.5]) - np.outer(one, one) / 3.0)
-    radial = 2.0 * SHEAR * (np.diag([1.0, 1.0, 0.5]) - np.outer(one, one) / 3.0)
+    normal = (deviator / np.maximum(length, 1e-300)[:, None])[:, kept]
+    one = unit[kept]
+    radial = 2.0 * SHEAR * (np.diag(1.0 / twice[kept]) - np.outer(one, one) / 3.0)
     along = np.where(slip > 0.0, 2.0 * SHEAR * (3.0 * SHEAR / (3.0 * SHEAR + HARDENING) - (1.0 - shrink)), 0.0)
-    tangent = elastic - (1.0 - shrink)[:, None, None] * radial
+    tangent = BULK * np.outer(one, one) + shrink[:, None, None] * radial
     tangent -= along[:, None, None] * normal[:, :, None] * normal[:, None, :]
     return new, plastic + slip, tangent
 
 
-def report(program: str, dofs: int, wall: float, settlement: float, iterations: int, processor: float) -> None:
+def report(
+    program: str,
+    dofs: int,
+    wall: float,
+    settlement: float,
+    iterations: int,
+    processor: float,
+    who: int = resource.RUSAGE_SELF,
+) -> None:
     """Print the JSON object that `footing.py` prints."""
-    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0
+    peak = resource.getrusage(who).ru_maxrss / 1024.0
     row = {"program": program, "dofs": dofs, "wall_s": round(wall, 3), "settlement_m": settlement}
     row |= {"cpu_s": round(processor, 3), "peak_mb": round(peak, 1), "iterations": iterations}
     print(json.dumps(row | {"load_average": os.getloadavg()[0]}))
