@@ -3,14 +3,19 @@
 By itself numba optimises every function and makes machine code of it, although only the entry runs, which has all of
 them within it. `InnerCompiler` leaves both to the entry. It steps into the pass that numba's guide to customised
 compilers shows, and into two methods of the library of code that this pass fills.
+
+While anything is compiled Python's garbage collector rests: what the compiler makes stays alive until it has done, and
+looking through it again and again was a seventh of the time.
 """
 
+import gc
 from typing import Any
 
 from numba._dynfunc import make_function
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import CompilerBase, DefaultPassBuilder
 from numba.core.compiler_machinery import register_pass
+from numba.core.event import Event, Listener, register
 from numba.core.typed_passes import NativeLowering
 
 
@@ -59,3 +64,27 @@ class InnerCompiler(CompilerBase):
         passes.passes = [(InnerLowering, why) if step is NativeLowering else (step, why) for step, why in passes.passes]
         passes.finalize()
         return [passes]
+
+
+class Undisturbed(Listener):
+    """Switches the garbage collector off while numba compiles; numba's lock admits one thread at a time."""
+
+    def __init__(self) -> None:
+        self.depth = 0
+        self.collecting = False
+
+    def on_start(self, event: Event) -> None:
+        """Switch it off when the outermost function begins."""
+        if self.depth == 0:
+            self.collecting = gc.isenabled()
+            gc.disable()
+        self.depth += 1
+
+    def on_end(self, event: Event) -> None:
+        """Switch it on again, if it was, when that function is done or has failed."""
+        self.depth -= 1
+        if self.depth == 0 and self.collecting:
+            gc.enable()
+
+
+register("numba:compile", Undisturbed())
