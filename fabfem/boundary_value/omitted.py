@@ -6,10 +6,12 @@ import numpy as np
 
 from fabfem.case import BoundaryValueCase
 from fabfem.fem.model import Model
+from fabfem.fem.multigrid import MANY
 from fabfem.fem.space import Space
 from fabfem.substance import Substance
+from umat import symmetric_tangent
 
-PROGRAM = 250.0
+PROGRAM = 210.0
 """Memory of the interpreter with all packages and compiled kernels [MiB]."""
 
 
@@ -65,22 +67,25 @@ def _each(space: Space) -> str:
 
 
 def memory(model: Model) -> float:
-    """Return an estimate of the memory that a run needs [MiB]: program, points, matrix and its factors."""
+    """Return an estimate of the memory that a run needs [MiB]: program, points, stiffness and what solves with it."""
     space = model.space
     states = sum(np.asarray(part).nbytes for zone in model.zones.values() for part in zone.state)
-    points = 3 * states + space.npoints * (3 * 36 + 8 * 6) * 8 + space.terms.nbytes
-    local = space.dofs.shape[1] ** 2 * len(space.dofs)
-    matrix = local * (8 + 4) + 2 * _entries(space) * 12
-    return PROGRAM + (points + matrix + _factors(space)) / 2**20
+    points = 3 * states + space.npoints * (2 * 36 + 8 * 6) * 8 + space.terms.nbytes
+    places = 2.0 * space.dofs.shape[1] ** 2 * len(space.dofs)
+    whole = 12.0 * _entries(space)
+    half = 0.5 if all(symmetric_tangent(zone.material) for zone in model.zones.values()) else 1.0
+    iterative = model.solver in ("auto", "multigrid") and space.mesh.dim == 3 and space.ndof >= MANY
+    solving = whole + 2.0 * whole if iterative else half * (whole + _factors(space))
+    return PROGRAM + (points + places + solving) / 2**20
 
 
 def _entries(space: Space) -> float:
     """Return about how many entries the stiffness has."""
-    return space.ndof * len(space.components) * (12.0 if space.mesh.dim == 2 else 45.0)
+    return space.ndof * len(space.components) * (12.0 if space.mesh.dim == 2 else 28.0)
 
 
 def _factors(space: Space) -> float:
     """Return about how many bytes the factors of the stiffness take, after nested dissection [George 1973]."""
     nodes = len(space.mesh.points)
     fill = 8.0 * nodes * np.log2(nodes + 1.0) if space.mesh.dim == 2 else 8.0 * nodes ** (4.0 / 3.0)
-    return 2.0 * fill * len(space.components) ** 2 * 12.0
+    return fill * len(space.components) ** 2 * 8.0

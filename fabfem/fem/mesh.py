@@ -76,9 +76,12 @@ class Mesh:
 def read_mesh(path: str | Path, order: int | None = None) -> Mesh:
     """The mesh in a file; order=2 turns linear elements into quadratic ones.
 
-    Raises MeshError where the file is missing or unreadable, mixes elements, or has inverted ones.
+    Raises MeshError where the file is missing or unreadable, mixes elements, has inverted ones, or quadratic ones for
+    order=1.
     """
     mesh = from_meshio(_read(Path(path)))
+    if order == 1 and mesh.element.midside:
+        raise MeshError(f"{Path(path).name} has elements of order 2 ({mesh.cell_type}), and order 1 is asked for")
     return quadratic(mesh) if order == 2 and mesh.element.quadratic else mesh
 
 

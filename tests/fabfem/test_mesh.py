@@ -120,6 +120,13 @@ def test_missing_and_unreadable_files(tmp_path: Path) -> None:
             read_mesh(tmp_path / name)
 
 
+def test_quadratic_elements_are_not_taken_for_linear_ones() -> None:
+    with pytest.raises(
+        MeshError, match="elements of order 2 .triangle6., and order 1 is asked for"
+    ):
+        read_mesh(SHIPPED / "strip_half.msh", 1)
+
+
 def test_unknown_names_list_those_that_exist() -> None:
     mesh = from_meshio(two_quads())
     with pytest.raises(MeshError, match="no boundary 'bass', did you mean 'base'; it has all, base"):
