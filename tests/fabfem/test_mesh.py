@@ -121,9 +121,7 @@ def test_missing_and_unreadable_files(tmp_path: Path) -> None:
 
 
 def test_quadratic_elements_are_not_taken_for_linear_ones() -> None:
-    with pytest.raises(
-        MeshError, match="elements of order 2 .triangle6., and order 1 is asked for"
-    ):
+    with pytest.raises(MeshError, match="elements of order 2"):
         read_mesh(SHIPPED / "strip_half.msh", 1)
 
 
