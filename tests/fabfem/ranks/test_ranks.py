@@ -140,7 +140,6 @@ from pathlib import Path
 import numpy as np
 from fabfem.boundary_value.problem import build
 from fabfem.case import case_from, read_tables
-from fabfem.fem.assembly import stiffness
 from fabfem.fem.model import elastic_tangents
 from fabfem.fem.solve import systems_of
 
@@ -148,7 +147,7 @@ path = Path(sys.argv[1])
 model = build(case_from(read_tables(path), path)).model
 system = systems_of(model)[1]
 tangent = elastic_tangents(model.zones, {name: zone.state for name, zone in model.zones.items()}, model.space.npoints)
-whole = system.reduce(stiffness(system.space, system.pattern, tangent))
+whole = system.reduction.stiffness(tangent)
 empty = whole.copy()
 empty.data[:] = 0.0
 solver = model.space.mesh.ranks.solver(system.constraints, system.space)
