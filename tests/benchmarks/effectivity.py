@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from page import write_table
 
 from fabfem.boundary_value.problem import build
 from fabfem.case import BoundaryValueCase, case_from, read_tables
@@ -19,8 +20,6 @@ from fabfem.fem.solve import march
 from fabfem.study.variants import with_value
 
 HOME = Path(__file__).parents[2]
-PAGE = HOME / "docs" / "study.md"
-MARK, END = "<!-- effectivity -->\n", "<!-- end -->"
 CYLINDER = HOME / "cases" / "hollow_cylinder" / "torsion.toml"
 FINEST, SECOND = 1e-6, "lebedev_35"
 TOLERANCES = (1e-2, 1e-3, 1e-4)
@@ -92,9 +91,7 @@ def lines() -> list[str]:
 def main() -> None:
     """Run everything and replace the table in the page."""
     table = lines()
-    before, mark, rest = PAGE.read_text(encoding="utf-8").partition(MARK)
-    assert mark, f"{PAGE.name} has no place for the table"
-    PAGE.write_text(before + MARK + "\n".join([*table, END]) + rest.partition(END)[2], encoding="utf-8")
+    write_table("study.md", "effectivity", table)
 
 
 if __name__ == "__main__":

@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+from page import write_table
 
 import umat
 from fabfem.fem.box import grid_mesh
@@ -35,8 +36,6 @@ from umat.fabric import Constant, ZhaoKruyt
 from umat.mandel import IDENTITY
 from umat.sands import SANDS
 
-PAGE = Path(__file__).parents[2] / "docs" / "study.md"
-MARK, END = "<!-- omissions -->\n", "<!-- end -->"
 REPEATS = 5
 RULE = "lebedev_23"
 OVERBURDEN = 20.0
@@ -218,9 +217,7 @@ def main() -> None:
     lines = ["| " + " | ".join(HEADINGS) + " |", "|" + "---|" * len(HEADINGS)]
     for less, one, more, other in PAIRS:
         lines.append("| " + " | ".join(_row(less, found[one], more, found[other])) + " |")
-    before, mark, rest = PAGE.read_text(encoding="utf-8").partition(MARK)
-    assert mark, f"{PAGE.name} has no place for the table"
-    PAGE.write_text(before + MARK + "\n".join([*lines, END]) + rest.partition(END)[2], encoding="utf-8")
+    write_table("study.md", "omissions", lines)
 
 
 if __name__ == "__main__":

@@ -13,11 +13,11 @@ import sys
 import tempfile
 from pathlib import Path
 
+from page import write_table
+
 from umat.cache import FOLDER, user_cache
 
 HOME = Path(__file__).parents[2]
-PAGE = HOME / "docs" / "study.md"
-MARK, END = "<!-- prices -->\n", "<!-- end -->"
 CASES = (
     *sorted(f"element/{path.stem}" for path in (HOME / "cases" / "element").glob("*.toml")),
     *("studies/lame", "studies/strip_von_mises", "studies/strip_prandtl", "hollow_cylinder/torsion"),
@@ -78,9 +78,7 @@ def main(names: list[str]) -> None:
     lines.append(f"\n{within} of {len(rows)} within a factor of two at first use.")
     print(lines[-1])
     if not names:
-        before, mark, rest = PAGE.read_text(encoding="utf-8").partition(MARK)
-        assert mark, f"{PAGE.name} has no place for the table"
-        PAGE.write_text(before + MARK + "\n".join([*lines, END]) + rest.partition(END)[2], encoding="utf-8")
+        write_table("study.md", "prices", lines)
 
 
 if __name__ == "__main__":

@@ -4,13 +4,13 @@ Every problem of `fabfem verify` is run, or those named, whose tables alone are 
 """
 
 import sys
-from pathlib import Path
 from time import perf_counter
+
+from page import write_table
 
 from fabfem.verification.problems import chosen, rows
 from fabfem.verification.report import cells
 
-PAGE = Path(__file__).parents[2] / "docs" / "verification.md"
 HEAD = (
     "| what | reference | got | error | allowed | time | verdict | how, or why not |\n|---|---|---|---|---|---|---|---|"
 )
@@ -24,11 +24,7 @@ def main(names: list[str]) -> None:
         lines = [HEAD, *("| " + " | ".join(cells(row)) + " |" for row in found)]
         green = sum(row.green for row in found)
         lines.append(f"\n{green} of {len(found)} green, {perf_counter() - start:.0f} s.")
-        page = PAGE.read_text(encoding="utf-8")
-        before, start_mark, rest = page.partition(f"<!-- {name} -->\n")
-        assert start_mark, f"docs/verification.md has no place for {name}"
-        _, end_mark, after = rest.partition("<!-- end -->")
-        PAGE.write_text(before + start_mark + "\n".join([*lines, end_mark]) + after, encoding="utf-8")
+        write_table("verification.md", name, lines)
         print(f"{name}: {green} of {len(found)} green")
 
 
