@@ -5,8 +5,6 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from filelock import FileLock, Timeout
-
 from fabfem.case import CaseError
 from fabfem.output.history import read_history
 from fabfem.output.progress import summary
@@ -73,6 +71,8 @@ def claimed(folder: Path) -> Iterator[None]:
     FolderError
         If nothing can be written there, or another run is writing there.
     """
+    from filelock import FileLock, Timeout
+
     lock = FileLock(folder / LOCK)
     try:
         folder.mkdir(parents=True, exist_ok=True)

@@ -63,7 +63,7 @@ def _worst(problem: Problem, increment: Increment) -> dict[str, Any]:
     """Return where the guess was most out of balance, and on which boundaries that is."""
     model, stage = problem.model, problem.model.stages[increment.stage_index]
     space = model.space
-    force = increment.external_force - space.internal_force(stress_of(increment.zones, increment.before, space.npoints))
+    force = increment.external_force - space.internal_force(stress_of(space, increment.zones, increment.before))
     kept = constrain(space, stage.supports, stage.bodies).keep_unknown(force)
     size = np.abs(kept[: len(space.mesh.points) * len(space.components)]).reshape(len(space.mesh.points), -1)
     nodes = space.mesh.ranks.nearest(-size.max(axis=1))  # one, on the ranks that have it

@@ -22,7 +22,7 @@ import numpy as np
 import umat
 from fabfem.boundary_value.probes import Column, Keeper, Value
 from fabfem.case import BoundaryValueCase, CaseError
-from fabfem.fem.model import Model, Zone, elastic_tangents
+from fabfem.fem.model import Model, Zone, tangents
 from fabfem.fem.recovery import energy_density, fine_space, nearest, recovered, stress_within
 from fabfem.fem.share import mapped
 from fabfem.fem.solve import Increment
@@ -51,9 +51,12 @@ class Discretisation:
         """Return the (nel,) energies of the error and of the stress."""
         zones, space = self.model.zones, self.model.space
         stress = _stress(self.model, increment)
-        points = elastic_tangents(zones, increment.states, space.npoints).reshape(-1, space.nq, 6, 6)
-        elastic = points[:, nearest(space, self.fine)].reshape(-1, 6, 6)
-        within = stress_within(space, self.fine, stress, increment.tangent, increment.displacement)
+        points = np.zeros((space.npoints, 6, 6))
+        for name, zone in zones.items():
+            points[zone.points] = umat.elastic_tangent(zone.material, increment.states[name])
+        elastic = points.reshape(-1, space.nq, 6, 6)[:, nearest(space, self.fine)].reshape(-1, 6, 6)
+        tangent = tangents(space, increment.zones, space.strain(increment.step), increment.before)
+        within = stress_within(space, self.fine, stress, tangent, increment.displacement)
         weights = self.fine.weights
         parts = (energy_density(part, elastic) * weights for part in (self.recovered(stress) - within, within))
         error, energy = (part.reshape(-1, self.fine.nq).sum(axis=1) for part in parts)

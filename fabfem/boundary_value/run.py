@@ -24,7 +24,8 @@ from fabfem.identity import identity
 from fabfem.outcome import INTERRUPTED, Description, Outcome, claimed, short, unwritten
 from fabfem.output.checkpoints import Checkpoint
 from fabfem.output.interrupt import held_back, patient
-from fabfem.output.progress import Quiet, Terminal
+from fabfem.output.progress import Quiet
+from fabfem.output.progress import shown as progress
 from fabfem.rates import duration
 from fabfem.restart import FRESH, Restart, checkpoint_of
 from fabfem.timing import Timer
@@ -70,7 +71,7 @@ def run(
         ranks.sum(0)  # none writes before the folder is there
         try:
             recorder = _recorder(problem, folder, timer, known, begun, restart)
-            with Quiet() if quiet or ranks.rank else Terminal(len(problem.model.stages)) as shown:
+            with progress(quiet or bool(ranks.rank), len(problem.model.stages)) as shown:
                 status, reason = _drive(steps, recorder, shown)
         except OSError as error:
             if ranks.size > 1:  # the others wait for this rank, and do not know

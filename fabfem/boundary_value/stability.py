@@ -13,6 +13,7 @@ import numpy as np
 
 import umat
 from fabfem.fem.increment import Increment
+from fabfem.fem.model import tangents
 from fabfem.fem.space import Space
 from umat.mandel import COLUMN, FACTOR, ROW, Array
 
@@ -40,10 +41,13 @@ def second_order_work(space: Space, increment: Increment) -> Array:
 def acoustic_determinant(space: Space, increment: Increment) -> Array:
     """Return the least determinant (npoints,) of the acoustic tensor over that of the elastic tangent [-]."""
     normals = _directions(space.mesh.dim)
-    ratio = np.ones(space.npoints)
+    ratio, tangent = (
+        np.ones(space.npoints),
+        tangents(space, increment.zones, space.strain(increment.step), increment.before),
+    )
     for name, zone in increment.zones.items():
         elastic = umat.elastic_tangent(zone.material, increment.states[name])
-        ratio[zone.points] = _least(increment.tangent[zone.points], elastic, normals)
+        ratio[zone.points] = _least(tangent[zone.points], elastic, normals)
     return ratio
 
 

@@ -47,9 +47,7 @@ Factors = Annotated[
 class Table(BaseModel):
     """One table of a case file."""
 
-    model_config = ConfigDict(
-        defer_build=True, strict=True, extra="forbid", frozen=True, allow_inf_nan=False, use_attribute_docstrings=True
-    )
+    model_config = ConfigDict(defer_build=True, strict=True, extra="forbid", frozen=True, allow_inf_nan=False)
 
     @model_validator(mode="before")
     @classmethod

@@ -23,7 +23,7 @@ class Pattern:
     rows: np.ndarray
     """(nel, m) rows of each element's matrix, negative where they are left out."""
     offsets: np.ndarray
-    """(nel, m, m) place of each entry in its row, in two bytes where that is enough."""
+    """(nel, m, m) place of each entry in its row, in one byte where that is enough."""
     triangle: bool = False
     """Whether entries below the diagonal are left out."""
 
@@ -48,26 +48,24 @@ def find_pattern(rows: np.ndarray, n: int, triangle: bool = False) -> Pattern:
     graph.sort_indices()
     indptr, indices = graph.indptr.astype(np.int32), graph.indices.astype(np.int32)
     longest = int(np.diff(indptr).max(initial=0))
-    wide = np.uint16 if longest <= np.iinfo(np.uint16).max else np.int32
-    offsets = np.zeros((*rows.shape, rows.shape[1]), wide)
+    offsets = np.zeros((*rows.shape, rows.shape[1]), np.min_scalar_type(longest))
     _fill_offsets(offsets, rows, indptr, indices, triangle)
     return Pattern(indptr, indices, rows, offsets, triangle)
 
 
 def stiffness(space: Space, pattern: Pattern, tangent: np.ndarray) -> csr_matrix:
-    """(n, n) stiffness of the tangents (npoints, 6, 6), as much of it as the pattern has."""
+    """(n, n) stiffness of the tangents (npoints, k, k) between active components, as much as the pattern has."""
+    assert tangent.shape[1] == len(space.kinematics.active), "a tangent has the active components alone"
     data = np.zeros(len(pattern.indices))
     where = (pattern.indptr, pattern.rows, pattern.offsets, pattern.triangle)
-    operator = (space.kinematics.active, *space.kinematics.sparse_operator)
-    _stiffness(data, tangent, space.weights, space.terms, *where, *operator)
+    _stiffness(data, tangent, space.weights, space.terms, *where, *space.kinematics.sparse_operator)
     return pattern.matrix(data)
 
 
 def diagonal(space: Space, tangent: np.ndarray) -> np.ndarray:
     """(ndof,) diagonal of the stiffness of all dofs, without the elements of other ranks."""
     found = np.zeros(space.ndof)
-    operator = (space.kinematics.active, *space.kinematics.sparse_operator)
-    _diagonal(found, tangent, space.weights, space.terms, space.dofs, *operator)
+    _diagonal(found, tangent, space.weights, space.terms, space.dofs, *space.kinematics.sparse_operator)
     return found
 
 
@@ -85,29 +83,30 @@ def _fill_offsets(offsets, rows, indptr, indices, triangle):
 
 
 @numba.njit(cache=True, nogil=True)
-def _diagonal(found, tangent, weights, terms, dofs, active, where, values):
+def _diagonal(found, tangent, weights, terms, dofs, where, values):
     nel, nq = terms.shape[:2]
-    b, cb = np.empty((len(active), dofs.shape[1])), np.empty((len(active), dofs.shape[1]))
+    nactive = tangent.shape[1]
+    b, cb = np.empty((nactive, dofs.shape[1])), np.empty((nactive, dofs.shape[1]))
     for e in range(nel):
         for q in range(nq):
             _fill(b, terms[e, q], where, values)
-            _contract(cb, tangent[e * nq + q], b, active, weights[e * nq + q])
+            _contract(cb, tangent[e * nq + q], b, weights[e * nq + q])
             for i in range(b.shape[1]):
-                for r in range(len(active)):
+                for r in range(nactive):
                     found[dofs[e, i]] += b[r, i] * cb[r, i]
 
 
 @numba.njit(cache=True, nogil=True)
-def _stiffness(data, tangent, weights, terms, indptr, rows, offsets, triangle, active, where, values):
+def _stiffness(data, tangent, weights, terms, indptr, rows, offsets, triangle, where, values):
     nel, nq = terms.shape[:2]
-    m, nactive = rows.shape[1], len(active)
+    m, nactive = rows.shape[1], tangent.shape[1]
     b, cb, local = np.empty((nactive, m)), np.empty((nactive, m)), np.empty((m, m))
     for e in range(nel):
         local[:] = 0.0
         for q in range(nq):
             p = e * nq + q
             _fill(b, terms[e, q], where, values)
-            _contract(cb, tangent[p], b, active, weights[p])
+            _contract(cb, tangent[p], b, weights[p])
             _add_product(local, b, cb)
         for i in range(m):
             if rows[e, i] >= 0:
@@ -129,12 +128,12 @@ def _fill(matrix, terms, where, values):
 
 
 @numba.njit(cache=True, nogil=True)
-def _contract(cb, c, b, active, weight):
-    """Set cb to weight * c[active, active] @ b."""
+def _contract(cb, c, b, weight):
+    """Set cb to weight * c @ b."""
     cb[:] = 0.0
-    for r in range(len(active)):
-        for s in range(len(active)):
-            factor = weight * c[active[r], active[s]]
+    for r in range(len(c)):
+        for s in range(len(c)):
+            factor = weight * c[r, s]
             for j in range(b.shape[1]):
                 cb[r, j] += factor * b[s, j]
 

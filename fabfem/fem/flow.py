@@ -100,7 +100,7 @@ def _loosened(slow: System, tolerance: float, drag: float) -> System:
 
 def elastic_displacement(system: System, now: Equilibrium, load: np.ndarray) -> float:
     """Largest displacement of a node of the elastic body under `load` alone [length], infinite where there is none."""
-    tangent = elastic_tangents(system.zones, now.states, system.space.npoints)
+    tangent = elastic_tangents(system.space, system.zones, now.states)
     task = Task(load, np.zeros(len(load)), None)
     answer = solved(system, stiffness_of(system, task, tangent), system.constraints.collect(load))
     return np.inf if isinstance(answer, Refusal) else largest(system, system.constraints.spread(answer))

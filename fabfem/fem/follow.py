@@ -217,7 +217,7 @@ def _directions(
     """The displacements (ndof,) that the out-of-balance force and a unit of the load factor make."""
     result = _both(system, load, tangent, unbalanced)
     if isinstance(result, Refusal):
-        elastic = elastic_tangents(system.zones, old.states, system.space.npoints)
+        elastic = elastic_tangents(system.space, system.zones, old.states)
         return _both(system, load, tangent + SHIFT * elastic, unbalanced)
     return result
 
@@ -241,5 +241,5 @@ def _both(
 def _task(system: System, load: Loading, factor: float, old: Equilibrium, size: float) -> Task:
     eta, viscous = system.controls.viscosity, None
     if eta > 0.0:
-        viscous = eta / size * elastic_tangents(system.zones, old.states, system.space.npoints)
+        viscous = eta / size * elastic_tangents(system.space, system.zones, old.states)
     return Task(load.total(factor), factor * system.constraints.motion, viscous)

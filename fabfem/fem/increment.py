@@ -78,7 +78,7 @@ class Increment:
     before: States
     """States where the increment began."""
     tangent: np.ndarray
-    """(npoints, 6, 6) consistent tangent at its end; zero where there is no zone."""
+    """(npoints, k, k) consistent tangent at its end between active components; `model.tangents` has all."""
     resume: Start
     """Where a march can be taken up after it."""
     strength: float = 1.0

@@ -73,6 +73,13 @@ class Kinematics:
         """Mandel components that can be non-zero."""
         return np.flatnonzero(self.operator.any(axis=(1, 2)))
 
+    def between(self, tangent: np.ndarray) -> np.ndarray:
+        """(n, k, k) entries between the k active components of tangents (n, 6, 6): all that a stiffness is made of."""
+        if len(self.active) == 6:
+            return tangent
+        entries = (6 * self.active[:, None] + self.active).ravel()
+        return tangent.reshape(-1, 36).take(entries, axis=1).reshape(-1, len(self.active), len(self.active))
+
     @cached_property
     def sparse_operator(self) -> tuple[np.ndarray, np.ndarray]:
         """(n, 3) rows (among `active`), components, shape terms and (n,) values of the operator's entries."""

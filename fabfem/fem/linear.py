@@ -5,6 +5,8 @@ analysis while the pattern stays; SuperLU needs nothing but scipy.
 """
 
 import os
+from collections.abc import Sequence
+from ctypes import POINTER, byref, c_int32
 from importlib.util import find_spec
 from typing import Any, NamedTuple, Protocol
 from weakref import finalize
@@ -21,6 +23,9 @@ USELESS = 1e-6
 """Relative residual above which a solution is refused."""
 OVERFLOW = 1e14
 """Solution over right-hand side, scaled to a unit diagonal, above which the matrix is as good as singular."""
+
+
+NO_MATRIX = "no matrix was given"
 
 
 def norm(vector: np.ndarray) -> float:
@@ -52,9 +57,12 @@ class Backend(Protocol):
     def solve(self, rhs: np.ndarray) -> np.ndarray:
         """Solve with the last factors."""
 
+    def forget(self) -> None:
+        """Let the last matrix go."""
+
 
 class LinearSolver(Protocol):
-    """What the Newton iteration needs; a distributed solver implements the same two functions."""
+    """What the Newton iteration needs; a distributed solver implements the same functions."""
 
     name: str
     triangle: bool
@@ -66,6 +74,9 @@ class LinearSolver(Protocol):
     def solve(self, rhs: np.ndarray) -> Solution:
         """Solve with the last matrix."""
 
+    def forget(self) -> None:
+        """Let the last matrix go, before another takes its room."""
+
 
 class DirectSolver:
     """Checks and refinement around a backend."""
@@ -75,7 +86,12 @@ class DirectSolver:
         self._backend = backend
         self._matrix = csr_matrix((0, 0))
         self._diagonal = self._scale = np.zeros(0)
-        self._failure = "no matrix was given"
+        self._failure = NO_MATRIX
+
+    def forget(self) -> None:
+        """Let the last matrix go."""
+        self._matrix, self._failure = csr_matrix((0, 0)), NO_MATRIX
+        self._backend.forget()
 
     def factor(self, matrix: csr_matrix) -> None:
         """Factor `matrix`; a failure shows in the next `solve`."""
@@ -166,6 +182,10 @@ class SuperLUBackend:
         assert self._factors is not None
         return self._factors.solve(rhs, trans="T")
 
+    def forget(self) -> None:
+        """Let the last factors go, for they are made anew."""
+        self._factors = None
+
 
 _SYMMETRIC_PATTERN: dict[str, Any] = {
     "permc_spec": "MMD_AT_PLUS_A",
@@ -174,10 +194,9 @@ _SYMMETRIC_PATTERN: dict[str, Any] = {
 }
 
 
-def _same(matrix: csr_matrix, other: csr_matrix) -> bool:
-    """Whether two matrices have one pattern; its arrays are compared only where they are not the same."""
-    pairs = ((matrix.indptr, other.indptr), (matrix.indices, other.indices))
-    return all(mine is its or np.array_equal(mine, its) for mine, its in pairs)
+def _same(pattern: Sequence[np.ndarray], other: Sequence[np.ndarray]) -> bool:
+    """Whether two patterns are one; their arrays are compared only where they are not the same."""
+    return all(mine is its or np.array_equal(mine, its) for mine, its in zip(pattern, other, strict=True))
 
 
 class PardisoBackend:
@@ -193,41 +212,65 @@ class PardisoBackend:
         from pypardiso import PyPardisoSolver
 
         self._solver = PyPardisoSolver(mtype=-2 if symmetric else 1)
+        handle, kind, settings = self._solver.pt, c_int32(self._solver.mtype), self._solver.iparm
+        self._solver.libmkl.pardisoinit(_address(handle), byref(kind), _address(settings))  # its defaults
         for number, value in ({} if coupled else _SETTINGS).items():
-            self._solver.iparm[number - 1] = value
+            settings[number - 1] = value
+        settings[_FROM_ZERO - 1] = 1
         # the next solver finds the library at once, instead of looking through all folders again (0.2 s)
         os.environ.setdefault("PYPARDISO_MKL_RT", self._solver.libmkl._name)
-        self.triangle = symmetric
-        self._matrix = csr_matrix((0, 0))
+        self.triangle, self._coupled = symmetric, coupled
+        self._matrix, self._pattern = csr_matrix((0, 0)), (np.zeros(0), np.zeros(0))
 
     def factor(self, matrix: csr_matrix, fresh: bool) -> None:
         """Factor, with a new analysis where the pattern is new or `fresh`."""
-        known = _same(matrix, self._matrix)
-        if not self._matrix.shape[0]:  # there is nothing to free before
+        pattern = (matrix.indptr, matrix.indices)
+        known = _same(pattern, self._pattern)
+        if not len(self._pattern[0]):  # there is nothing to free before
             finalize(self, self._solver.free_memory, everything=True)
-        self._matrix = matrix
+        self._matrix, self._pattern = matrix, pattern
+        self._solver.iparm[_PIVOTS - 1] = fresh or self._coupled
         self._call(22 if known and not fresh else 12, np.zeros(matrix.shape[0]))
 
     def solve(self, rhs: np.ndarray) -> np.ndarray:
         """Solve with the last factors."""
         return self._call(33, rhs)
 
+    def forget(self) -> None:
+        """Let the last matrix go; the analysis of its pattern stays."""
+        self._matrix = csr_matrix((0, 0))
+
     def _call(self, phase: int, rhs: np.ndarray) -> np.ndarray:
-        from pypardiso.pardiso_wrapper import PyPardisoError
+        """Run a phase on arrays as they are; pypardiso's own call would copy the pattern, counted from one."""
+        pardiso, matrix, x, error = self._solver, self._matrix, np.zeros_like(rhs), c_int32(0)
+        copies, which, kind, at, n, sides, silent = (
+            byref(c_int32(value)) for value in (1, 1, pardiso.mtype, phase, len(rhs), 1, 0)
+        )
+        pattern = (_address(matrix.indptr), _address(matrix.indices), _address(pardiso.perm))
+        handle, values, settings = _address(pardiso.pt), _address(matrix.data), _address(pardiso.iparm)
+        given, found = _address(np.ascontiguousarray(rhs)), _address(x)
+        pardiso._mkl_pardiso(
+            *(handle, copies, which, kind, at, n, values, *pattern, sides, settings, silent, given, found),
+            byref(error),
+        )
+        if error.value:
+            raise ArithmeticError(f"PARDISO refused the stiffness matrix (error {error.value})")
+        return x
 
-        self._solver.set_phase(phase)
-        try:
-            return self._solver._call_pardiso(self._matrix, rhs)
-        except PyPardisoError as error:
-            raise ArithmeticError(f"PARDISO refused the stiffness matrix (error {error.value})") from error
+
+def _address(array: np.ndarray) -> Any:
+    """Where an array without gaps begins, for C."""
+    return array.ctypes.data_as(POINTER(np.ctypeslib.as_ctypes_type(array.dtype)))
 
 
-_SETTINGS = {1: 1, 2: 2, 3: 0, 8: 0, 10: 13, 11: 0, 13: 0, 21: 1, 24: 1}
-"""PARDISO's parameters, counted from 1: own values (1), nested dissection (2), no refinement but where a pivot was
-perturbed (8), by 1e-13 (10), no scaling (11) or matching (13), which would need a new
-analysis for every matrix; pivots of two rows where symmetric (21), two levels of parallel work (24). With its own
-defaults, which equations with pore pressures need, a solve takes two to three times as long, for refinement that
-`DirectSolver` does where it is due."""
+_SETTINGS = {2: 2, 8: 0, 10: 13, 11: 0, 13: 0, 24: 1}
+"""PARDISO's parameters, counted from 1: nested dissection (2), no refinement but where a pivot was perturbed (8), by
+1e-13 (10), no scaling (11) or matching (13), which would need a new analysis for every matrix; two levels of parallel
+work (24). With its own defaults, which equations with pore pressures need, a solve takes two to three times as long,
+for refinement that `DirectSolver` does where it is due."""
+_PIVOTS, _FROM_ZERO = 21, 35
+"""Pivots of two rows in a symmetric matrix: a tenth slower, only where those of one have left a poor solution; and
+indices that count from zero."""
 
 
 def make_solver(name: str = "auto", symmetric: bool = False, coupled: bool = False) -> LinearSolver:

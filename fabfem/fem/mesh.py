@@ -10,13 +10,15 @@ from dataclasses import dataclass, replace
 from difflib import get_close_matches
 from io import StringIO
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-import meshio
 import numpy as np
-from meshio.abaqus._abaqus import abaqus_to_meshio_type
 
 from fabfem.fem.elements import ELEMENTS, ElementType, quadrature, shape
 from fabfem.fem.ranks import ALONE, Alone
+
+if TYPE_CHECKING:
+    import meshio
 
 
 class MeshError(ValueError):
@@ -85,7 +87,7 @@ def read_mesh(path: str | Path, order: int | None = None) -> Mesh:
     return quadratic(mesh) if order == 2 and mesh.element.quadratic else mesh
 
 
-def from_meshio(raw: meshio.Mesh) -> Mesh:
+def from_meshio(raw: "meshio.Mesh") -> Mesh:
     """The mesh in a meshio record."""
     cell_type = _cell_type([block.type for block in raw.cells])
     element = ELEMENTS[cell_type]
@@ -173,11 +175,14 @@ def distinct(rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return first, number
 
 
-def _read(path: Path) -> meshio.Mesh:
+def _read(path: Path) -> "meshio.Mesh":
     """What meshio reads; its prints and its exit become one sentence."""
     if not path.is_file():
         raise MeshError(f"there is no mesh file {path}.")
     _whole(path)
+    import meshio
+    from meshio.abaqus._abaqus import abaqus_to_meshio_type
+
     for name, cell_type in _ABAQUS.items():
         abaqus_to_meshio_type.setdefault(name, cell_type)
     said = StringIO()
@@ -197,7 +202,7 @@ def _whole(path: Path) -> None:
         )
 
 
-def _middle_last(raw: meshio.Mesh, path: Path) -> meshio.Mesh:
+def _middle_last(raw: "meshio.Mesh", path: Path) -> "meshio.Mesh":
     """The mesh with the middle node of a line last: Abaqus numbers it along the line, and meshio leaves it there."""
     if path.suffix.lower() == ".inp":
         for block in raw.cells:
@@ -215,10 +220,12 @@ _ABAQUS = {
 """Abaqus's plane and axisymmetric elements, of which meshio knows three."""
 
 
-def _physical(raw: meshio.Mesh) -> dict[str, list[np.ndarray]]:
+def _physical(raw: "meshio.Mesh") -> dict[str, list[np.ndarray]]:
     """Numbers, by block, of the cells in each physical group: gmsh's format 2.2, of which meshio makes no sets."""
+    from meshio._mesh import topological_dimension
+
     tags = raw.cell_data.get("gmsh:physical", [])
-    dims = [meshio._mesh.topological_dimension[block.type] for block in raw.cells]
+    dims = [topological_dimension[block.type] for block in raw.cells]
     return {
         name: [
             np.flatnonzero(tag == group) if dim == of else np.zeros(0, int) for tag, of in zip(tags, dims, strict=True)
@@ -256,7 +263,7 @@ def _add(table: dict[str, np.ndarray], name: str, items: np.ndarray) -> None:
         table[name] = items
 
 
-def _elements_in(raw: meshio.Mesh, blocks: list, cell_type: str) -> np.ndarray:
+def _elements_in(raw: "meshio.Mesh", blocks: list, cell_type: str) -> np.ndarray:
     """Numbers, among all elements of `cell_type`, of those in a set."""
     first, found = 0, []
     for block, chosen in zip(raw.cells, blocks, strict=True):
@@ -267,7 +274,7 @@ def _elements_in(raw: meshio.Mesh, blocks: list, cell_type: str) -> np.ndarray:
     return np.unique(np.concatenate(found)) if found else np.zeros(0, int)
 
 
-def _facets_in(raw: meshio.Mesh, blocks: list, facet_type: str) -> np.ndarray:
+def _facets_in(raw: "meshio.Mesh", blocks: list, facet_type: str) -> np.ndarray:
     """(n, nfacetnode) nodes of the facets in a set."""
     width = len(ELEMENTS[facet_type].nodes)
     chosen = [

@@ -4,7 +4,7 @@ Newton sees the points only through `update_points` and `elastic_tangents`, the 
 the solver only through `linear`; each works on the elements of its space, be it all of them or one rank's.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
@@ -146,7 +146,7 @@ class Batch(NamedTuple):
     stress: np.ndarray
     """(npoints, 6)"""
     tangent: np.ndarray
-    """(npoints, 6, 6)"""
+    """(npoints, k, k) between the components that the kinematics can strain."""
     states: States
     worst_point: int
     """Point with the largest integration error."""
@@ -161,8 +161,12 @@ HELD_STIFFNESS = 0.01
 """Tangent of a held point over the elastic one; its stress is constant, so this only steadies the iteration."""
 
 
+AT_ONCE = 4096
+"""Points that are asked at once: of their tangents (6, 6) only the part that the kinematics needs is kept."""
+
+
 def update_points(
-    zones: Mapping[str, Zone], strain_increment: np.ndarray, old: States, may_hold: float = 0.0
+    space: Space, zones: Mapping[str, Zone], strain_increment: np.ndarray, old: States, may_hold: float = 0.0
 ) -> Batch | Refusal:
     """The answer of all points to a strain increment (npoints, 6), or the first point that refused.
 
@@ -170,42 +174,65 @@ def update_points(
 
     `may_hold` is the share of all points that may refuse and are held instead.
     """
-    npoints, held, states = len(strain_increment), 0, dict(old)
-    whole = _room(zones, npoints)
+    held, states, tangent, error = 0, dict(old), _no_tangent(space), np.zeros(space.npoints)
     for name, zone in zones.items():
-        response = update(zone.material, zone.directions, strain_increment[zone.points], old[name])
-        refused = np.flatnonzero(response.status)
+        strain = strain_increment[zone.points]
+        states[name], status = _answered(space, zone, strain, old[name], tangent, error)
+        refused = np.flatnonzero(status)
         held += len(refused)
-        if held > may_hold * npoints:
-            return _refused(name, zone, strain_increment, old[name], response.status, refused)
-        values = _answer(zone, old[name], response, refused)
-        if whole:
-            for array, value in zip(whole, values, strict=True):
-                array[zone.points] = value
-        states[name] = response.state
-    stress, tangent, error = whole or values
+        if held > may_hold * space.npoints:
+            return _refused(name, zone, strain_increment, old[name], status, refused)
+    stress = stress_of(space, zones, states)
     bad = _not_finite(stress, tangent)
     if len(bad):
         return Refusal(f"{len(bad)} points have a stress or tangent that is not finite", int(bad[0]))
     return Batch(stress, tangent, states, int(error.argmax()), float(error.max()), error, held)
 
 
-def _room(zones: Mapping[str, Zone], npoints: int) -> tuple[np.ndarray, ...]:
-    """Zeros for the stress, tangent and error of all points; nothing where one zone has them all, in their order."""
-    if len(zones) == 1:
-        (points,) = (zone.points for zone in zones.values())
-        if isinstance(points, slice) and points.indices(npoints) == (0, npoints, 1):
-            return ()
-    return np.zeros((npoints, 6)), np.zeros((npoints, 6, 6)), np.zeros(npoints)
+def _answered(
+    space: Space, zone: Zone, strain: np.ndarray, old: Any, tangent: np.ndarray, error: np.ndarray
+) -> tuple[Any, np.ndarray]:
+    """New state and status of the points of a zone; their tangent and error are put among those of all points."""
+    new, status = type(old)(*(np.empty_like(part) for part in old)), np.zeros(len(strain), np.int8)
+    for part, where in _parts(zone.points, len(strain)):
+        before = _some(old, part)
+        response = update(zone.material, zone.directions, strain[part], before)
+        whole, error[where] = _held(zone, before, response)
+        tangent[where] = space.kinematics.between(whole)
+        status[part] = response.status
+        for values, piece in zip(new, response.state, strict=True):
+            values[part] = piece
+    return new, status
 
 
-def _answer(zone: Zone, old: Any, response: Response, refused: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Stress, tangent and error of the points of a zone; those that refused are held."""
-    if not len(refused):
-        return response.stress, response.tangent, response.error
-    tangent, error = response.tangent.copy(), response.error.copy()
-    tangent[refused], error[refused] = HELD_STIFFNESS * elastic_tangent(zone.material, old)[refused], 0.0
-    return response.stress, tangent, error
+def _held(zone: Zone, old: Any, response: Response) -> tuple[np.ndarray, np.ndarray]:
+    """Tangent (n, 6, 6) and error of the points of a response; those that refused are held."""
+    refused = response.status != 0
+    if not refused.any():
+        return response.tangent, response.error
+    soft = HELD_STIFFNESS * elastic_tangent(zone.material, old)
+    return np.where(refused[:, None, None], soft, response.tangent), np.where(refused, 0.0, response.error)
+
+
+def _parts(points: slice | np.ndarray, count: int) -> Iterator[tuple[slice, slice | np.ndarray]]:
+    """Which points of a zone are asked together, and where they are among all."""
+    for begin in range(0, count, AT_ONCE):
+        part = slice(begin, min(begin + AT_ONCE, count))
+        if isinstance(points, slice):
+            first = points.start or 0
+            yield part, slice(first + part.start, first + part.stop)
+        else:
+            yield part, points[part]
+
+
+def _some(state: Any, part: slice | np.ndarray) -> Any:
+    """The state of some points."""
+    return type(state)(*(values[part] for values in state))
+
+
+def _no_tangent(space: Space) -> np.ndarray:
+    k = len(space.kinematics.active)
+    return np.zeros((space.npoints, k, k))
 
 
 def _refused(
@@ -214,7 +241,7 @@ def _refused(
     """The refusal that names the first point of a zone that refused."""
     first = refused[:1]
     points = np.arange(len(strain_increment))[zone.points]
-    strain, state = strain_increment[points[first]], type(old)(*(part[first] for part in old))
+    strain, state = strain_increment[points[first]], _some(old, first)
     point, code = int(points[first[0]]), int(status[first[0]])
     alone = Refused(name, point, zone.material, zone.directions, state, strain, code)
     return Refusal(f"{len(refused)} points of zone '{name}': {message(code)}", point, alone)
@@ -228,17 +255,32 @@ def _not_finite(stress: np.ndarray, tangent: np.ndarray) -> np.ndarray:
     return np.flatnonzero(~(np.isfinite(stress).all(axis=1) & np.isfinite(tangent).all(axis=(1, 2))))
 
 
-def elastic_tangents(zones: Mapping[str, Zone], states: States, npoints: int) -> np.ndarray:
-    """(npoints, 6, 6) elastic tangents; zero where there is no zone."""
-    tangent = np.zeros((npoints, 6, 6))
+def elastic_tangents(space: Space, zones: Mapping[str, Zone], states: States) -> np.ndarray:
+    """(npoints, k, k) elastic tangents between active components; zero where there is no zone."""
+    tangent = _no_tangent(space)
     for name, zone in zones.items():
-        tangent[zone.points] = elastic_tangent(zone.material, states[name])
+        for part, where in _parts(zone.points, len(states[name].stress)):
+            elastic = elastic_tangent(zone.material, _some(states[name], part))
+            tangent[where] = space.kinematics.between(elastic)
     return tangent
 
 
-def stress_of(zones: Mapping[str, Zone], states: States, npoints: int) -> np.ndarray:
+def tangents(space: Space, zones: Mapping[str, Zone], strain_increment: np.ndarray, old: States) -> np.ndarray:
+    """(npoints, 6, 6) tangents, for who needs more than the stiffness; the points are asked for them once more."""
+    tangent = np.zeros((space.npoints, 6, 6))
+    for name, zone in zones.items():
+        response = update(zone.material, zone.directions, strain_increment[zone.points], old[name])
+        tangent[zone.points], _ = _held(zone, old[name], response)
+    return tangent
+
+
+def stress_of(space: Space, zones: Mapping[str, Zone], states: States) -> np.ndarray:
     """(npoints, 6) stress of the states; zero where there is no zone."""
-    stress = np.zeros((npoints, 6))
+    if len(zones) == 1:
+        ((name, zone),) = zones.items()
+        if isinstance(zone.points, slice) and zone.points.indices(space.npoints) == (0, space.npoints, 1):
+            return states[name].stress
+    stress = np.zeros((space.npoints, 6))
     for name, zone in zones.items():
         stress[zone.points] = states[name].stress
     return stress

@@ -88,6 +88,11 @@ class MultigridSolver:
         """Take a new matrix."""
         self._matrix, self._handed_on = matrix, False
 
+    def forget(self) -> None:
+        """Let the last matrix go."""
+        self._matrix = csr_matrix((0, 0))
+        self._direct.forget()
+
     def solve(self, rhs: np.ndarray) -> Solution:
         """Solve with the last matrix, directly where the iteration does not come to an end."""
         if not self._handed_on:

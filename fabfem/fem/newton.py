@@ -16,7 +16,7 @@ from scipy.sparse import csr_matrix
 from fabfem.fem.diagnosis import singularity
 from fabfem.fem.linear import whole
 from fabfem.fem.model import Controls, Refusal, elastic_tangents
-from fabfem.fem.trial import Equilibrium, System, Task, Trial, attempt, make_task, work
+from fabfem.fem.trial import Equilibrium, System, Task, Trial, attempt, make_task, resisted, work
 
 MARGIN = 0.1
 """What a correction with old factors must promise to leave, over the tolerance."""
@@ -66,6 +66,7 @@ def solve_increment(
             trial = _at(system, old, task, trial)
         matrix, trial = stiffness_of(system, task, trial.batch.tangent), trial.without_tangent()
         trial = _corrected(system, old, task, trial, matrix)
+        del matrix
     return Solved(trial, iterations, tuple(residuals), reused)
 
 
@@ -101,7 +102,7 @@ def _predicted(system: System, old: Equilibrium, task: Task) -> Trial | Refusal:
     return _first_that_works(
         lambda tangent: _extended(system, old, task, tangent),
         lambda: old.tangent,
-        lambda: elastic_tangents(system.zones, old.states, system.space.npoints),
+        lambda: elastic_tangents(system.space, system.zones, old.states),
     )
 
 
@@ -109,7 +110,7 @@ def _corrected(system: System, old: Equilibrium, task: Task, trial: Trial, matri
     """The trial that a correction with a stiffness leads to, or one with the elastic tangent where that fails."""
 
     def elastic() -> csr_matrix:
-        tangent = elastic_tangents(system.zones, trial.batch.states, system.space.npoints)
+        tangent = elastic_tangents(system.space, system.zones, trial.batch.states)
         return stiffness_of(system, task, tangent)
 
     return _first_that_works(lambda way: _searched(system, old, task, trial, way), lambda: matrix, elastic)
@@ -176,7 +177,11 @@ def _least(system: System, trial: Trial, tried: list[Trial | Refusal]) -> Trial 
 
 
 def stiffness_of(system: System, task: Task, tangent: np.ndarray) -> csr_matrix:
-    """The stiffness of the unknowns for a tangent (npoints, 6, 6), with the viscosity and the water of a task."""
+    """The stiffness of the unknowns for a tangent (npoints, k, k), with the viscosity and the water of a task.
+
+    The solver lets its last matrix go for it.
+    """
+    system.solver.forget()
     with system.timer.phase("assembly"):
         return system.reduction.stiffness(_with_viscosity(task, tangent), task.wet)
 
@@ -185,8 +190,7 @@ def pushed(system: System, task: Task, tangent: np.ndarray, motion: np.ndarray) 
     """The (ndof,) forces that a motion (ndof,) makes, with the same tangent, viscosity and water."""
     with system.timer.phase("assembly"):
         strain = system.space.strain(motion)
-        stress = (_with_viscosity(task, tangent) @ strain[:, :, None])[:, :, 0]
-        force = system.space.internal_force(stress)
+        force = resisted(system, _with_viscosity(task, tangent), strain)
         return force if task.wet is None else force + system.space.summed(task.wet @ motion)
 
 

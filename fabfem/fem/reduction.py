@@ -35,7 +35,7 @@ class Reduction:
     whole: Pattern | None = None
 
     def stiffness(self, tangent: np.ndarray, wet: csr_matrix | None = None) -> csr_matrix:
-        """The stiffness of the tangents (npoints, 6, 6), with what water adds to that of all dofs (`whole`)."""
+        """The stiffness of the tangents (npoints, k, k), with what water adds to that of all dofs (`whole`)."""
         if self.whole is None:
             return stiffness(self.space, self._direct, tangent)
         matrix = stiffness(self.space, self.whole, tangent)
@@ -84,7 +84,7 @@ class Reduction:
 
 def _bare(indptr: np.ndarray, indices: np.ndarray, triangle: bool) -> Pattern:
     """The pattern of a matrix that no element's matrix is put into."""
-    return Pattern(indptr, indices, np.zeros((0, 0), np.int32), np.zeros((0, 0, 0), np.uint16), triangle)
+    return Pattern(indptr, indices, np.zeros((0, 0), np.int32), np.zeros((0, 0, 0), np.uint8), triangle)
 
 
 def _expanded(transfer: csr_matrix, dofs: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -79,7 +79,7 @@ def march(model: Model, start: Start | None = None) -> Iterator[Increment | Stop
 def systems_of(model: Model) -> list[System]:
     """The equations of every stage; raises ValueError where a stage is impossible."""
     space = model.space
-    elastic = diagonal(space, elastic_tangents(model.zones, model.states, space.npoints))
+    elastic = diagonal(space, elastic_tangents(space, model.zones, model.states))
     stiffest = space.mesh.ranks.largest(float(np.abs(space.summed(elastic)).max()))
     coupled = model.water is not None or any(stage.bodies for stage in model.stages)
     shared = (find_pattern(space.dofs, space.ndof) if coupled else None, Timer(PHASES), stiffest)
@@ -139,7 +139,7 @@ def _system(
     solver = model.space.mesh.ranks.solver(constraints, model.space)
 
     def elastic() -> Near:
-        tangent = elastic_tangents(there, model.states, model.space.npoints)
+        tangent = elastic_tangents(model.space, there, model.states)
         return near(model.space, constraints, reduction.stiffness(tangent))
 
     solver = solver or _solver(model, there, constraints, elastic)
@@ -177,7 +177,7 @@ def _water(model: Model, stage: Stage, pattern: Pattern | None) -> Water | None:
 
 def _all_stages(model: Model, systems: list[System], start: Start | None) -> Iterator[Increment | Stopped | Collapsed]:
     space = model.space
-    now = Equilibrium(np.zeros(space.ndof), model.states, np.zeros(space.ndof), np.zeros((0, 6, 6)))
+    now = Equilibrium(np.zeros(space.ndof), model.states, np.zeros(space.ndof), np.zeros((0, 0, 0)))
     number, time = (start.number, start.time) if start else (0, 0.0)
     done = start.stage_index if start else 0
     del systems[:done]
@@ -206,9 +206,8 @@ def _all_stages(model: Model, systems: list[System], start: Start | None) -> Ite
 def _begun(now: Equilibrium, stage: Stage, system: System) -> Equilibrium:
     """The state in which a stage begins: materials changed, forces those of the zones that are there."""
     states = now.states | {name: change.begin(now.states[name]) for name, change in stage.changes.items()}
-    npoints = system.space.npoints
-    force = system.space.internal_force(stress_of(system.zones, states, npoints))
-    return Equilibrium(now.displacement, states, force, elastic_tangents(system.zones, states, npoints))
+    force = system.space.internal_force(stress_of(system.space, system.zones, states))
+    return Equilibrium(now.displacement, states, force, elastic_tangents(system.space, system.zones, states))
 
 
 def _course(place: Place, system: System, now: Equilibrium) -> Course:

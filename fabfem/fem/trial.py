@@ -47,7 +47,7 @@ class Equilibrium(NamedTuple):
     force: np.ndarray
     """(ndof,) internal force of the skeleton, without drag."""
     tangent: np.ndarray
-    """(npoints, 6, 6) what the first correction of the next increment uses."""
+    """(npoints, k, k) what the first correction of the next increment uses."""
 
 
 class Task(NamedTuple):
@@ -58,7 +58,7 @@ class Task(NamedTuple):
     motion: np.ndarray
     """(ndof,) displacement in it of the dofs that are no unknowns."""
     viscous: np.ndarray | None
-    """(npoints, 6, 6) viscous stress by strain increment, where there is viscosity."""
+    """(npoints, k, k) viscous stress by strain increment, where there is viscosity."""
     start: np.ndarray | None = None
     """(ndof,) internal force at its start, where that is not the skeleton's alone."""
     wet: csr_matrix | None = None
@@ -90,14 +90,14 @@ class Trial(NamedTuple):
 
     def without_tangent(self) -> "Trial":
         """The trial where its tangent, which is large, is not needed any more."""
-        return self._replace(batch=self.batch._replace(tangent=np.zeros((0, 6, 6))))
+        return self._replace(batch=self.batch._replace(tangent=np.zeros((0, 0, 0))))
 
 
 def make_task(system: System, old: Equilibrium, load: np.ndarray, size: float) -> Task:
     """What an increment has to balance that takes a part `size` of the stage."""
     eta, viscous = system.controls.viscosity, None
     if eta > 0.0:
-        viscous = eta / size * elastic_tangents(system.zones, old.states, system.space.npoints)
+        viscous = eta / size * elastic_tangents(system.space, system.zones, old.states)
     motion = size * system.constraints.motion
     if system.water is None:
         return Task(load, motion, viscous)
@@ -123,7 +123,7 @@ def attempt(system: System, old: Equilibrium, task: Task, step: np.ndarray) -> T
     """What a displacement increment leaves out of balance, or why the points refuse it."""
     strain = system.space.strain(step)
     with system.timer.phase("material"):
-        batch = update_points(system.zones, strain, old.states, system.controls.held)
+        batch = update_points(system.space, system.zones, strain, old.states, system.controls.held)
     batch = system.space.mesh.ranks.agreed(batch, system.space.nq, system.controls.held)
     if isinstance(batch, Refusal):
         return batch
@@ -163,7 +163,14 @@ def _water(system: System, old: Equilibrium, task: Task, step: np.ndarray) -> np
 def _drag(system: System, task: Task, strain: np.ndarray) -> np.ndarray:
     if task.viscous is None:
         return np.zeros(system.space.ndof)
-    return system.space.internal_force((task.viscous @ strain[:, :, None])[:, :, 0])
+    return resisted(system, task.viscous, strain)
+
+
+def resisted(system: System, tangent: np.ndarray, strain: np.ndarray) -> np.ndarray:
+    """The (ndof,) nodal forces of the stress that tangents (npoints, k, k) make of a strain (npoints, 6)."""
+    active, stress = system.space.kinematics.active, np.zeros_like(strain)
+    stress[:, active] = (tangent @ strain[:, active, None])[:, :, 0]
+    return system.space.internal_force(stress)
 
 
 def relative(system: System, size: float, force: np.ndarray, load: np.ndarray) -> float:

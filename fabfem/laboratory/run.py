@@ -18,7 +18,8 @@ from fabfem.laboratory.specimen import Specimen, build
 from fabfem.laboratory.stages import End, path
 from fabfem.outcome import INTERRUPTED, Description, Outcome, claimed, short, unwritten
 from fabfem.output.interrupt import held_back, patient
-from fabfem.output.progress import Quiet, Terminal
+from fabfem.output.progress import Quiet
+from fabfem.output.progress import shown as progress
 from fabfem.rates import duration
 from fabfem.restart import FRESH, Restart, checkpoint_of
 from fabfem.timing import Timer
@@ -79,7 +80,7 @@ def run(
     with claimed(folder):
         try:
             recorder = Recorder(specimen, folder, timer, known, written)
-            with Quiet() if quiet else Terminal(len(case.stage)) as shown:
+            with progress(quiet, len(case.stage)) as shown:
                 status, reason = _drive(specimen, recorder, shown, start)
         except OSError as error:
             return unwritten(error, folder, timer.total())

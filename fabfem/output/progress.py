@@ -1,11 +1,12 @@
 """What the terminal shows while a run goes on, and the summary that closes it."""
 
+import sys
 from collections.abc import Sequence
 from types import TracebackType
-from typing import Self
+from typing import TYPE_CHECKING, Self
 
-from rich.console import Console
-from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+if TYPE_CHECKING:
+    from rich.console import Console
 
 
 class Quiet:
@@ -26,10 +27,28 @@ class Quiet:
         """Show that an increment has converged."""
 
 
+class Lines(Quiet):
+    """The lines alone, for a file or a pipe."""
+
+    def say(self, line: str) -> None:
+        """Show a line of text."""
+        print(line, file=sys.stderr)
+
+
 class Terminal(Quiet):
     """A bar with stage, increment, iterations and the time left."""
 
-    def __init__(self, stages: int, console: Console | None = None) -> None:
+    def __init__(self, stages: int, console: "Console | None" = None) -> None:
+        from rich.console import Console
+        from rich.progress import (
+            BarColumn,
+            Progress,
+            TaskProgressColumn,
+            TextColumn,
+            TimeElapsedColumn,
+            TimeRemainingColumn,
+        )
+
         self._bar = Progress(
             TextColumn("{task.description:<14}"),
             BarColumn(),
@@ -59,6 +78,13 @@ class Terminal(Quiet):
     def advance(self, stage: str, done: float, increment: int, iterations: int) -> None:
         """Move the bar to ``done`` stages, of which the last may be a fraction."""
         self._bar.update(self._task, description=stage, completed=done, increment=increment, iterations=iterations)
+
+
+def shown(quiet: bool, stages: int) -> Quiet:
+    """Return what shows a run of so many stages: nothing, its lines, or a bar where there is a terminal to draw it."""
+    if quiet:
+        return Quiet()
+    return Terminal(stages) if sys.stderr.isatty() else Lines()
 
 
 def summary(lines: Sequence[tuple[str, str]], prefix: str = "  ") -> str:

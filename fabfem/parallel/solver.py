@@ -117,6 +117,9 @@ class PetscSolver:
         what = f"residual {residual:.1e}" if growth == np.inf else f"it moves {growth:.1e} times too far"
         return Solution(nothing, residual, False, f"the stiffness matrix is singular or nearly so ({what})")
 
+    def forget(self) -> None:
+        """Keep the matrix: the next one takes its place."""
+
     def release(self) -> None:
         """Give back the matrix and its factors."""
         for thing in (self._ksp, self._matrix):

@@ -102,7 +102,7 @@ def _solution(space: Space, sharp: Space) -> np.ndarray:
     moved = space.internal_force((tangent @ space.strain(given)[:, :, None])[:, :, 0])
     solver, none = make_solver(symmetric=True), np.zeros(0, int)
     constraints = Constraints(free, np.zeros(space.ndof), none, np.zeros((0, 0)))
-    solver.factor(Reduction(space, constraints, solver.triangle).stiffness(tangent))
+    solver.factor(Reduction(space, constraints, solver.triangle).stiffness(space.kinematics.between(tangent)))
     given[free] = solver.solve((_body_force(sharp) - moved)[free]).x
     return given
 

@@ -53,7 +53,7 @@ def solver_and_matrix(name: str) -> tuple[MultigridSolver, csr_matrix]:
     elastic = Elastic(1e4, 0.3)
     tangent = elastic_tangent(elastic, initial_state(elastic, None, np.zeros((space.npoints, 6))))
     pattern = find_pattern(space.dofs, space.ndof) if bodies else None
-    matrix = Reduction(space, constraints, whole=pattern).stiffness(tangent)
+    matrix = Reduction(space, constraints, whole=pattern).stiffness(space.kinematics.between(tangent))
     return MultigridSolver(lambda: near(space, constraints, matrix), make_solver("superlu"), symmetric=True), matrix
 
 

@@ -100,7 +100,7 @@ def test_a_refused_point_is_named() -> None:
     model = footing("von_mises")
     strain = np.zeros((model.space.npoints, 6))
     strain[17, 3] = np.nan
-    refusal = update_points(model.zones, strain, model.states)
+    refusal = update_points(model.space, model.zones, strain, model.states)
     assert isinstance(refusal, Refusal)
     assert refusal.point == 17
     assert "zone 'all'" in refusal.reason

@@ -15,15 +15,7 @@ import time
 from pathlib import Path
 
 import numpy as np
-from grid import CUTS, HARDENING, POISSON, PRESSURE, YIELD, YOUNG, report, triangles
-
-
-def with_middles(points, cells):
-    """Return points and cells with a node in the middle of each side."""
-    sides = np.sort(cells[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
-    sides, number = np.unique(sides, axis=0, return_inverse=True)
-    middles = len(points) + number.reshape(-1, 3)
-    return np.concatenate([points, points[sides].mean(axis=1)]), np.concatenate([cells, middles], axis=1)
+from grid import CUTS, HARDENING, POISSON, PRESSURE, YIELD, YOUNG, report, triangles, with_middles
 
 
 def lines(rows):

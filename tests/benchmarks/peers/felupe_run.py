@@ -11,7 +11,7 @@ import time
 
 import felupe
 import numpy as np
-from grid import CUTS, HARDENING, POISSON, PRESSURE, YIELD, YOUNG, report, triangles
+from grid import CUTS, HARDENING, POISSON, PRESSURE, YIELD, YOUNG, report, strip_load, triangles, with_middles
 from pypardiso import spsolve
 
 
@@ -66,24 +66,6 @@ def solve(cuts):
         iterations += done.iterations
     settlement = -field[0].values[np.argmin(np.abs(points).sum(axis=1)), 1]
     return 2 * len(points), time.perf_counter() - begin, settlement, iterations, time.process_time() - used
-
-
-def with_middles(points, cells):
-    """Return points and cells with a node in the middle of each side."""
-    sides = np.sort(cells[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
-    sides, number = np.unique(sides, axis=0, return_inverse=True)
-    middles = len(points) + number.reshape(-1, 3)
-    return np.concatenate([points, points[sides].mean(axis=1)]), np.concatenate([cells, middles], axis=1)
-
-
-def strip_load(points, cuts):
-    """Return the nodes of the strip and the area of each: 1/6, 4/6, 1/6 of a side of length 0.2/cuts."""
-    strip = np.flatnonzero((np.abs(points[:, 1]) < 1e-9) & (points[:, 0] < 1.0 + 1e-9))
-    place = np.rint(points[strip, 0] * 10.0 * cuts).astype(int)
-    side = 0.2 / cuts
-    shares = np.where(place % 2 == 1, 4.0, 2.0) * side / 6.0
-    shares[(place == 0) | (place == place.max())] = side / 6.0
-    return strip, shares
 
 
 dofs, wall, settlement, iterations, processor = solve(CUTS[sys.argv[1]])

@@ -42,6 +42,24 @@ def tetrahedra(counts: tuple[int, ...]) -> tuple[np.ndarray, np.ndarray]:
     return points, (first.reshape(-1, 1, 1) + paths).reshape(-1, 4)
 
 
+def with_middles(points: np.ndarray, cells: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return points and cells with a node in the middle of each side."""
+    sides = np.sort(cells[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
+    sides, number = np.unique(sides, axis=0, return_inverse=True)
+    middles = len(points) + number.reshape(-1, 3)
+    return np.concatenate([points, points[sides].mean(axis=1)]), np.concatenate([cells, middles], axis=1)
+
+
+def strip_load(points: np.ndarray, cuts: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return the nodes of the strip and the area of each: 1/6, 4/6, 1/6 of a side of length 0.2/cuts."""
+    strip = np.flatnonzero((np.abs(points[:, 1]) < 1e-9) & (points[:, 0] < 1.0 + 1e-9))
+    place = np.rint(points[strip, 0] * 10.0 * cuts).astype(int)
+    side = 0.2 / cuts
+    shares = np.where(place % 2 == 1, 4.0, 2.0) * side / 6.0
+    shares[(place == 0) | (place == place.max())] = side / 6.0
+    return strip, shares
+
+
 def returned(stress: np.ndarray, plastic: np.ndarray, strain: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return stress, plastic strain and tangent (n, k, k) after strain increments (n, k), shears doubled.
 

@@ -147,7 +147,7 @@ from fabfem.fem.solve import systems_of
 path = Path(sys.argv[1])
 model = build(case_from(read_tables(path), path)).model
 system = systems_of(model)[1]
-tangent = elastic_tangents(model.zones, {name: zone.state for name, zone in model.zones.items()}, model.space.npoints)
+tangent = elastic_tangents(model.space, model.zones, model.states)
 whole = system.reduction.stiffness(tangent)
 empty = whole.copy()
 empty.data[:] = 0.0
