@@ -161,7 +161,7 @@ HELD_STIFFNESS = 0.01
 """Tangent of a held point over the elastic one; its stress is constant, so this only steadies the iteration."""
 
 
-AT_ONCE = 4096
+AT_ONCE = 8192
 """Points that are asked at once: of their tangents (6, 6) only the part that the kinematics needs is kept."""
 
 
