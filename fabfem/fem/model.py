@@ -161,8 +161,10 @@ HELD_STIFFNESS = 0.01
 """Tangent of a held point over the elastic one; its stress is constant, so this only steadies the iteration."""
 
 
-AT_ONCE = 8192
-"""Points that are asked at once: of their tangents (6, 6) only the part that the kinematics needs is kept."""
+MANY, AT_ONCE = 16384, 4096
+"""Points of a zone from which they are not asked all at once, and how many are then: of their tangents (6, 6) only the
+part that the kinematics needs is kept. In a small run the allocator would give back what each part took (a tenth
+slower)."""
 
 
 def update_points(
@@ -216,8 +218,9 @@ def _held(zone: Zone, old: Any, response: Response) -> tuple[np.ndarray, np.ndar
 
 def _parts(points: slice | np.ndarray, count: int) -> Iterator[tuple[slice, slice | np.ndarray]]:
     """Which points of a zone are asked together, and where they are among all."""
-    for begin in range(0, count, AT_ONCE):
-        part = slice(begin, min(begin + AT_ONCE, count))
+    size = AT_ONCE if count > MANY else max(count, 1)
+    for begin in range(0, count, size):
+        part = slice(begin, min(begin + size, count))
         if isinstance(points, slice):
             first = points.start or 0
             yield part, slice(first + part.start, first + part.stop)
