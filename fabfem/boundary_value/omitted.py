@@ -70,8 +70,8 @@ def memory(model: Model) -> float:
     """Return an estimate of the memory that a run needs [MiB]: program, points, stiffness and what solves with it."""
     space = model.space
     states = sum(np.asarray(part).nbytes for zone in model.zones.values() for part in zone.state)
-    points = 3 * states + space.npoints * (2 * 36 + 8 * 6) * 8 + space.terms.nbytes
-    places = 2.0 * space.dofs.shape[1] ** 2 * len(space.dofs)
+    points = 3 * states + space.npoints * (2 * len(space.kinematics.active) ** 2 + 8 * 6) * 8 + space.terms.nbytes
+    places = (1.0 if space.mesh.dim == 2 else 2.0) * space.dofs.shape[1] ** 2 * len(space.dofs)
     whole = 12.0 * _entries(space)
     half = 0.5 if all(symmetric_tangent(zone.material) for zone in model.zones.values()) else 1.0
     iterative = model.solver in ("auto", "multigrid") and space.mesh.dim == 3 and space.ndof >= MANY
