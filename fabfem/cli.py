@@ -7,6 +7,7 @@ command needs it.
 """
 
 import argparse
+import atexit
 import gc
 import os
 import sys
@@ -29,6 +30,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """
     options = parser().parse_args(arguments)
     gc.set_threshold(50_000, 20, 50)  # most objects of a command stay: looking through them is a tenth of a short run
+    atexit.register(gc.freeze)  # and the interpreter need not look through them once more before it leaves
     try:
         with warnings.catch_warnings(), ended_together(options.debug):
             if not options.debug:  # numbers out of all proportion overflow; what is not finite is refused with a reason
