@@ -127,6 +127,15 @@ def rotated(rule: Directions, matrix: ArrayLike) -> Directions:
     return Directions(normals, rule.weights, f"{rule.name} rotated", rule.degree)
 
 
+def rotation(axis: Axis, degrees: float) -> np.ndarray:
+    """Return the (3, 3) right-handed rotation about an axis."""
+    first, second = (np.roll(range(3), -AXES.index(axis))[1:]).tolist()
+    matrix = np.eye(3)
+    c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
+    matrix[np.ix_([first, second], [first, second])] = [[c, -s], [s, c]]
+    return matrix
+
+
 def mirrored(rule: Directions, axis: Axis = "z") -> Directions:
     """Return the quarter left when directions equal by mirror symmetry are one.
 
