@@ -15,7 +15,7 @@ import warnings
 from collections.abc import Sequence
 
 from fabfem import __version__
-from fabfem.commands import authoring, checks, routines, runs, studies
+from fabfem.commands import authoring, checks, keys, routines, runs, studies
 from fabfem.commands.status import BAD_INPUT, DONE, INTERRUPTED, STOPPED, fail
 from fabfem.parallel.world import ended_together, launched
 
@@ -72,6 +72,6 @@ def parser() -> argparse.ArgumentParser:
     common.add_argument("--debug", action="store_true", help="show the traceback of an error")
     commands = whole.add_subparsers(title="commands", required=True, metavar="COMMAND")
     authoring.add_commands(whole, commands, common)
-    for group in (runs, studies, checks, routines):
+    for group in (keys, runs, studies, checks, routines):
         group.add_commands(commands, common)
     return whole

@@ -28,7 +28,8 @@ _TABLES = {
     "bazant_oh_37": ("sphere_BO37.csv", 11),
     "icosahedral_61": ("sphere_ICO61.csv", 15),
 }
-_FAMILIES = ("lebedev_<degree>", "gauss_<n_theta>x<n_phi>")
+NAMES = (*_TABLES, "lebedev_<degree>", "gauss_<n_theta>x<n_phi>")
+"""Names of rules and families of rules."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,8 +78,7 @@ def directions(name: str) -> Directions:
     n_theta, cross, n_phi = size.partition("x")
     if family == "gauss" and cross and n_theta.isdecimal() and n_phi.isdecimal():
         return gauss(int(n_theta), int(n_phi))
-    known = ", ".join([*_TABLES, *_FAMILIES])
-    raise ValueError(f"no directions are called {name!r}; there are {known}")
+    raise ValueError(f"no directions are called {name!r}; there are {', '.join(NAMES)}")
 
 
 def lebedev(degree: int) -> Directions:
