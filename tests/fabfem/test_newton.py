@@ -104,3 +104,21 @@ def test_a_refused_point_is_named() -> None:
     assert isinstance(refusal, Refusal)
     assert refusal.point == 17
     assert "zone 'all'" in refusal.reason
+
+
+@pytest.mark.parametrize("ids", [False, True], ids=["slice", "numbers"])
+def test_points_asked_in_parts_answer_the_same(ids: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    model = footing("von_mises")
+    zone = model.zones["all"]
+    zones = {"all": zone._replace(points=np.arange(model.space.npoints)) if ids else zone}
+    strain = 1e-3 * np.random.default_rng(0).normal(size=(model.space.npoints, 6))
+    whole = update_points(model.space, zones, strain, model.states)
+    monkeypatch.setattr("fabfem.fem.model.MANY", 10)
+    monkeypatch.setattr("fabfem.fem.model.AT_ONCE", 7)
+    parts = update_points(model.space, zones, strain, model.states)
+    assert not isinstance(whole, Refusal)
+    assert not isinstance(parts, Refusal)
+    for one, other in zip(whole.states["all"], parts.states["all"], strict=True):
+        assert np.array_equal(one, other)
+    assert np.array_equal(whole.tangent, parts.tangent)
+    assert np.array_equal(whole.stress, parts.stress)
