@@ -6,9 +6,8 @@ owns, displacements first, then pressures; the first rank also those of the moti
 
 Multigrid smooths aggregates of nodes (GAMG) and is told the rigid motions as the near null space [Vaněk, Mandel &
 Brezina 1996]; with pore pressure the two fields are split, the pressure's Schur complement approximated with the
-diagonal of the stiffness. Its solves are as exact as the Newton iteration can use [Eisenstat & Walker 1996]: the
-residual is to fall to GAMMA times the square of what the last correction left of the out-of-balance force, within
-(LEAST, MOST). Where it does not converge, as the tangent of a body that fails, that one solve is MUMPS's.
+diagonal of the stiffness. Its solves are as exact as the Newton iteration can use (`forcing`). Where it does not
+converge, as the tangent of a body that fails, that one solve is MUMPS's.
 """
 
 from collections.abc import Mapping
@@ -23,10 +22,9 @@ from fabfem.fem.linear import OVERFLOW, POOR, REFINEMENTS, USELESS, Solution
 from fabfem.fem.pores import PorousSpace
 from fabfem.fem.space import Space
 from fabfem.fem.supports import Constraints
+from fabfem.parallel.forcing import forcing
 from fabfem.parallel.rows import Rows
 
-GAMMA, LEAST, MOST = 0.5, 1e-8, 1e-3
-"""Factor and bounds of the tolerance of an iterative solve."""
 DIRECT: dict[str, Any] = {
     "ksp_type": "preonly",
     "pc_type": "lu",
@@ -128,8 +126,8 @@ class PetscSolver:
         """Return the relative residual that is asked of an iterative solve; a direct one's is its own affair."""
         if not self._settings.multigrid:
             return 0.0
-        left, self._last = (size / self._last if self._last else 1.0), size
-        return float(np.clip(GAMMA * left**2, LEAST, MOST))
+        last, self._last = self._last, size
+        return forcing(size, last)
 
     def _solved(self, b: PETSc.Vec, size: float, wanted: float) -> tuple[PETSc.Vec, float]:
         """Return the solution and its relative residual: of the iteration, else refined once by a direct solver."""
