@@ -22,6 +22,7 @@ from fabfem.fem.linear import OVERFLOW, POOR, REFINEMENTS, USELESS, Solution
 from fabfem.fem.pores import PorousSpace
 from fabfem.fem.space import Space
 from fabfem.fem.supports import Constraints
+from fabfem.parallel.condition import condition_number
 from fabfem.parallel.forcing import forcing
 from fabfem.parallel.rows import Rows
 
@@ -114,6 +115,16 @@ class PetscSolver:
             return Solution(self._rows.unknowns(x), residual, True, "")
         what = f"residual {residual:.1e}" if growth == np.inf else f"it moves {growth:.1e} times too far"
         return Solution(nothing, residual, False, f"the stiffness matrix is singular or nearly so ({what})")
+
+    def condition(self, matrix: csr_matrix) -> float:
+        """Return the condition number of a matrix, scaled to a unit diagonal; infinite where it is singular."""
+        self.factor(matrix)
+        if self._failure or self._matrix is None:
+            return np.inf
+        ksp = self._made(multigrid=False)
+        number = condition_number(self._matrix, ksp, self._space.mesh.ranks)
+        ksp.destroy()
+        return number
 
     def release(self) -> None:
         """Give back the matrix and its factors."""

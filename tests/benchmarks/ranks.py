@@ -9,8 +9,8 @@ as it came.
 A difference is the largest over all rows of a column, over the largest value of the columns with that unit: a force
 that is zero by symmetry is round-off of the others. Where it passes 10⁻⁸ the last row before that is named, and where
 they are not the same the first row with another number of iterations. `superlu` is the run of one process with SuperLU
-in place of PARDISO: what the scene makes of another round-off, without any ranks. ``--tolerance 1e-10`` with a
-``--folder`` of its own lets all runs iterate until round-off is all that is left.
+in place of PARDISO: what the scene makes of another round-off, without any ranks. ``--set solver.tolerance=1e-10``, or
+``--set material.sand.parameters.tolerance=1e-5``, with a ``--folder`` of its own runs the scenes with other settings.
 """
 
 import argparse
@@ -45,20 +45,21 @@ def scenes() -> list[str]:
     return [f"{path.parent.name}/{path.stem}" for path in meshed]
 
 
-def run(case: Path, folder: Path, increments: int | None, linear: str, tolerance: float) -> int:
+def run(case: Path, folder: Path, increments: int, changes: list[str]) -> int:
     """Run the first increments of a scene in this process, or as one of several; return an exit status."""
     sys.path.insert(0, str(HOME))
     import fabfem.boundary_value.run as boundary_value
     from fabfem.case import case_from, read_tables
     from fabfem.parallel.world import ended_together
     from fabfem.run import run_case
+    from fabfem.study.variants import with_value
 
     march = boundary_value.march
     if increments:
         boundary_value.march = lambda model, start=None: islice(march(model, start), increments)
     tables = read_tables(case)
-    changes = ({"linear": linear} if linear else {}) | ({"tolerance": tolerance} if tolerance else {})
-    tables["solver"] = {**tables.get("solver", {}), **changes}
+    for place, value in (change.split("=", 1) for change in changes):
+        tables = with_value(tables, place, json.loads(value))
     with ended_together(traceback=True):
         outcome = run_case(case_from(tables, case), folder, quiet=True)
     return 0 if outcome.status in ("completed", "stopped") else 1
@@ -70,8 +71,8 @@ def begun(name: str, case: Path, folder: Path, said: argparse.Namespace) -> str:
     folder.mkdir(parents=True)
     launcher = ["mpiexec", "-n", name] if name.isdigit() else []
     words = [sys.executable, __file__, "--run", str(case), str(folder), "--increments", str(said.increments)]
-    words += ["--linear", name] if name == OTHER else []
-    words += ["--tolerance", str(said.tolerance)]
+    changes = [*said.set, f'solver.linear="{OTHER}"'] if name == OTHER else said.set
+    words += ["--set", *changes] if changes else []
     before = os.times()
     with (folder / "said").open("w", encoding="utf-8") as log:
         process = subprocess.Popen([*launcher, *words], env=os.environ | QUIET, stdout=log, stderr=log)
@@ -170,14 +171,13 @@ def main() -> int:
     parser.add_argument("--increments", type=int, default=0, help="the first increments alone")
     parser.add_argument("--minutes", type=float, default=15.0, help="limit of each run")
     parser.add_argument("--folder", type=Path, default=HOME / "results" / "ranks")
-    parser.add_argument("--tolerance", type=float, default=0.0, help="of the forces, in place of the case's")
+    parser.add_argument("--set", nargs="+", default=[], metavar="PLACE=VALUE", help="in place of what the cases have")
     parser.add_argument("--json", action="store_true")
     parser.add_argument("--write", default="", metavar="NAME", help="place of docs/parallel.md to put the table in")
-    parser.add_argument("--linear", default="", help=argparse.SUPPRESS)
     parser.add_argument("--run", nargs=2, type=Path, metavar=("CASE", "FOLDER"), help=argparse.SUPPRESS)
     said = parser.parse_args()
     if said.run:
-        return run(*said.run, said.increments, said.linear, said.tolerance)
+        return run(*said.run, said.increments, said.set)
     lines = []
     for scene in said.scenes:
         row = compared(scene, said)

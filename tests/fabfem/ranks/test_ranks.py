@@ -30,7 +30,7 @@ CALM = {
     **{"OMPI_MCA_rmaps_base_oversubscribe": "1", "OMPI_MCA_hwloc_base_binding_policy": "none"},
 }
 """Lets Open MPI start more processes than there are cores, as root in a container too."""
-EXACT = [name for name in SCENES if name not in ("multigrid", "options", "split")]
+EXACT = [name for name in SCENES if name not in ("multigrid", "options", "split", "ill")]
 
 
 def started(ranks: int, *words: str | Path) -> subprocess.CompletedProcess[str]:
@@ -153,9 +153,9 @@ def test_an_iterative_solve_is_as_exact_as_newton_s_iteration_can_use(tmp_path: 
     expected = [forcing(*pair) for pair in zip(size, [0.0, *size[:-1]], strict=True)]
     np.testing.assert_allclose(handed, 0.5 * np.array(expected))
     assert (reached <= handed).all()
-    falls = [k for k in range(1, len(size) - 1) if size[k + 1] < 0.1 * size[k] < 0.01 * size[k - 1]]
-    assert falls, "no iteration of Newton's contracts twice"
-    assert all(handed[k + 1] < handed[k] < 0.5e-3 for k in falls)
+    within = [k for k in range(len(size) - 2) if size[k] > 10.0 * size[k + 1] > 100.0 * size[k + 2]]
+    assert any(handed[k] > handed[k + 1] > handed[k + 2] for k in within), "in one of Newton's iterations at least"
+    assert ((handed >= 0.5 * LEAST) & (handed <= 0.5 * MOST)).all()
 
 
 FORCING = """
@@ -180,6 +180,17 @@ sys.exit(status)
 
 
 @needs_mpi
+def test_several_ranks_find_the_condition_of_the_whole_matrix(shared: Path, tmp_path: Path) -> None:
+    """From solves with MUMPS's factors and their transposes; the growth of its pivots MUMPS does not tell."""
+    assert ran(tmp_path, 0, ["ill"]).returncode == 0
+    (header, _, one), (other, _, two) = table(tmp_path / "ill"), table(shared / "ill")
+    assert header[-2:] == ["condition_number [-]", "pivot_growth [-]"]
+    assert other == header[:-1]
+    assert one[:, -2].max() > 2.0 * one[0, -2], "clay that yields resists less"
+    np.testing.assert_allclose(two[:, -1], one[:, -2], rtol=1e-6)
+
+
+@needs_mpi
 def test_options_of_petsc_go_before_the_program_s_and_mumps_stands_in(alone: Path, shared: Path) -> None:
     ranks = json.loads((shared / "options" / "report.json").read_text(encoding="utf-8"))["ranks"]
     assert ranks["direct_instead"][0] == ranks["solves"][0] > 2  # one iteration, as the case says, is never enough
@@ -194,8 +205,7 @@ def test_progress_and_summary_come_from_the_first_rank_alone(tmp_path: Path) -> 
     done = started(2, tmp_path / "program.py", tmp_path / "dry.toml", tmp_path / "out", tmp_path)
     assert done.returncode == 0, done.stderr
     first, shown, second, silent = ((tmp_path / name).read_text("utf-8") for name in ("1.0", "2.0", "1.1", "2.1"))
-    assert "6 increments" in first, first
-    assert first.count(str(tmp_path / "out")) == 1
+    assert first.count("completed after 6 increments") == 1
     assert "increment 6" in shown
     assert second == silent == ""
 
@@ -343,7 +353,6 @@ def test_a_rank_that_fails_stops_all_with_its_reason(tmp_path: Path) -> None:
     [
         ('boundary = "top"', 'boundary = "topp"', "the mesh has no boundary 'topp'"),
         ("k0 = 0.6", "k0 = 0.6\n[solver]\nlinear = 'superlu'", "is a solver of one process"),
-        ("k0 = 0.6", "k0 = 0.6\n[solver]\ndiagnose = true", "by one process with the whole mesh"),
         ('fix = ["x", "y"]', 'fix = ["x"]', "one rigid motion"),
     ],
 )
