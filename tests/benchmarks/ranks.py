@@ -17,6 +17,7 @@ import argparse
 import csv
 import json
 import os
+import re
 import subprocess
 import sys
 import tomllib
@@ -84,8 +85,8 @@ def begun(name: str, case: Path, folder: Path, said: argparse.Namespace) -> str:
             status = None
     after, told = os.times(), (folder / "said").read_text(encoding="utf-8")
     spent = after.children_user + after.children_system - before.children_user - before.children_system
-    lines = [line for line in told.splitlines() if "fabfem:" in line or "Error" in line]
-    why = (lines or [f"status {status}"])[0] if status else ""
+    reasons = re.findall(r"^(?:fabfem|[\w.]*Error): (.*)", told, re.MULTILINE)
+    why = (reasons or [f"status {status}"])[0] if status else ""
     ended = {"whole": status == 0, "increments": said.increments, "why": why, "processor": round(spent, 1)}
     (folder / "ended.json").write_text(json.dumps(ended), encoding="utf-8")
     return why
@@ -101,22 +102,43 @@ def rows(folder: Path) -> tuple[list[str], list[list[str]]]:
 def differences(one: Path, other: Path) -> tuple[np.ndarray, np.ndarray]:
     """Return the largest difference of two histories, row by row, and whether they have the same iterations there.
 
-    A difference is infinite where the rows are not of the same stages.
+    Where increments were halved in one of them alone, the other is interpolated in time within a stage.
     """
     (header, a), (again, b) = rows(one), rows(other)
-    n = min(len(a), len(b))
-    stages = [[row[0] for row in table[:n]] for table in (a, b)]
-    if header != again or stages[0] != stages[1]:
-        return np.full(max(n, 1), np.inf), np.zeros(max(n, 1), bool)
-    one_, other_ = (np.array([[float(value or "nan") for value in row[1:]] for row in table[:n]]) for table in (a, b))
+    assert header == again, f"{one} and {other} have not the same columns"
     names, units = zip(*(name.split(" [") for name in header[1:]), strict=True)
+    pairs = [_side_by_side(*(_of_stage(lines, stage) for lines in (a, b)), names.index("time")) for stage in _stages(a)]
+    one_, other_, same = (np.concatenate(parts) for parts in zip(*pairs, strict=True))
     counts = np.isin(names, COUNTS)
-    found = np.zeros(n)
+    found = np.zeros(len(one_))
     for unit in set(units):
         columns = [place for place, own in enumerate(units) if own == unit and not counts[place]]
         gap = np.nan_to_num(np.abs(one_[:, columns] - other_[:, columns])).max(axis=1, initial=0.0)
         found = np.maximum(found, gap / max(np.nanmax(np.abs(one_[:, columns]), initial=0.0), 1e-300))
-    return found, (one_[:, counts] == other_[:, counts]).all(axis=1)
+    return found, same & (one_[:, counts] == other_[:, counts]).all(axis=1)
+
+
+def _stages(lines: list[list[str]]) -> list[str]:
+    return list(dict.fromkeys(line[0] for line in lines))
+
+
+def _of_stage(lines: list[list[str]], stage: str) -> np.ndarray:
+    """Return the numbers of the rows of a stage, NaN where there is none."""
+    found = [[float(value or "nan") for value in line[1:]] for line in lines if line[0] == stage]
+    return np.array(found).reshape(len(found), -1)
+
+
+def _side_by_side(a: np.ndarray, b: np.ndarray, time: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return rows of one history, those of the other at the same times, and whether these are rows of its own."""
+    n = min(len(a), len(b))
+    if n == 0:
+        return a[:0], a[:0], np.zeros(0, bool)
+    apart = np.abs(a[:n, time] - b[:n, time]) > 1e-9
+    if not apart.any():
+        return a[:n], b[:n], ~apart
+    there = a[:, time] <= b[-1, time] + 1e-9
+    own = np.arange(int(there.sum())) < int(apart.argmax())
+    return a[there], np.stack([np.interp(a[there, time], b[:, time], column) for column in b.T], axis=1), own
 
 
 def compared(scene: str, said: argparse.Namespace) -> dict[str, object]:
