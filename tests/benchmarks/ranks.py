@@ -34,7 +34,7 @@ LIMIT = 1e-8
 COUNTS = ("increment", "iterations")
 """Columns that count; they are the same or not."""
 ALONE, OTHER = "alone", "superlu"
-HEADINGS = "| scene | increments | {} | imbalance of elements | processor time of each run [s] |"
+HEADINGS = "| scene | increments | {} | imbalance of elements |"
 QUIET = {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1", "OMPI_MCA_mpi_yield_when_idle": "1"}
 QUIET |= {"OMPI_MCA_rmaps_base_oversubscribe": "1", "OMPI_MCA_hwloc_base_binding_policy": "none"}
 
@@ -170,7 +170,7 @@ def told(one: Path, other: Path, whole: bool) -> str:
     """Return the difference of two runs, how far it is small enough, and how far one of them came."""
     (gaps, alike), n, m = differences(one, other), len(rows(one)[1]), len(rows(other)[1])
     words = [f"{gaps.max(initial=0.0):.0e}"]
-    words += [f"small to {np.flatnonzero(gaps > LIMIT)[0]}"] if (gaps > LIMIT).any() else []
+    words += [f"to {np.flatnonzero(gaps > LIMIT)[0]}"] if (gaps > LIMIT).any() else []
     words += [f"iterations differ at {np.flatnonzero(~alike)[0] + 1}"] if not alike.all() else []
     words += [f"{m} increments"] if m != n else []
     return ", ".join(words if whole else [*words, "not to its end"])
@@ -178,11 +178,10 @@ def told(one: Path, other: Path, whole: bool) -> str:
 
 def table(row: dict[str, object], said: argparse.Namespace) -> str:
     """Return a row as the document has it."""
-    count = row.get("rows", row.get(ALONE))
+    count = row.get("rows", row.get(ALONE, "–"))
     imbalance = [str(row[f"imbalance on {n}"]) for n in said.runs if n != "1" and f"imbalance on {n}" in row]
-    spent = [str(row.get(f"processor of {n}", "–")) for n in (ALONE, *said.runs)]
     shown = [f"{'all ' if row.get('whole') else ''}{count}", *(row.get(n, "–") for n in said.runs)]
-    return f"| `{row['scene']}` | {' | '.join(map(str, shown))} | {', '.join(imbalance)} | {', '.join(spent)} |"
+    return f"| `{row['scene']}` | {' | '.join(map(str, shown))} | {', '.join(imbalance)} |"
 
 
 def main() -> int:
