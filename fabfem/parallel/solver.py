@@ -23,7 +23,7 @@ from fabfem.fem.pores import PorousSpace
 from fabfem.fem.space import Space
 from fabfem.fem.supports import Constraints
 from fabfem.parallel.condition import condition_number
-from fabfem.parallel.forcing import forcing
+from fabfem.parallel.forcing import MOST, forcing
 from fabfem.parallel.rows import Rows
 
 DIRECT: dict[str, Any] = {
@@ -85,7 +85,8 @@ class PetscSolver:
         self._space = space
         self._matrix: PETSc.Mat | None = None
         self._ksp: PETSc.KSP | None = None
-        self._failure, self._last = "no matrix was given", 0.0
+        self._failure = "no matrix was given"
+        self._new, self._last, self._wanted = True, 0.0, MOST
 
     def factor(self, matrix: csr_matrix) -> None:
         """Take a new matrix, this rank's share of it; a failure shows in the next `solve`."""
@@ -94,6 +95,7 @@ class PetscSolver:
         if not finite:
             return
         _release_others(self)
+        self._new = True
         self._matrix = self._rows.matrix(matrix, self._matrix)
         if self._ksp is not None:
             self._ksp.setOperators(self._matrix)
@@ -134,11 +136,16 @@ class PetscSolver:
         self._ksp = self._matrix = None
 
     def _tolerance(self, size: float) -> float:
-        """Return the relative residual that is asked of an iterative solve; a direct one's is its own affair."""
+        """Return the relative residual that is asked of an iterative solve; a direct one's is its own affair.
+
+        The first solve with a matrix is for the out-of-balance force; another, as for the load that a control scales,
+        is as exact.
+        """
         if not self._settings.multigrid:
             return 0.0
-        last, self._last = self._last, size
-        return forcing(size, last)
+        if self._new:
+            self._wanted, self._last, self._new = forcing(size, self._last), size, False
+        return self._wanted
 
     def _solved(self, b: PETSc.Vec, size: float, wanted: float) -> tuple[PETSc.Vec, float]:
         """Return the solution and its relative residual: of the iteration, else refined once by a direct solver."""

@@ -202,6 +202,7 @@ SCENES = {
 }
 SCENES |= {
     "multigrid": SOLID + '[solver]\nlinear = "multigrid"\ntolerance = 1e-8\n',
+    "held": BODY + '[solver]\nlinear = "multigrid"\ntolerance = 1e-8\n',
     "options": SOLID + '[solver]\nlinear = "multigrid"\npetsc = { ksp_max_it = 1 }\n',
     "ill": DRY + "[solver]\ndiagnose = true\n",
     "split": WET + '[solver]\nlinear = "multigrid"\ntolerance = 1e-8\n',
