@@ -13,10 +13,12 @@ from typing import Any
 
 from numba._dynfunc import make_function
 from numba.core.codegen import JITCodeLibrary
+from numba.core import errors, types
 from numba.core.compiler import CompilerBase, DefaultPassBuilder
-from numba.core.compiler_machinery import register_pass
+from numba.core.compiler_machinery import PassManager, register_pass
 from numba.core.event import Event, Listener, register
-from numba.core.typed_passes import NativeLowering
+from numba.core.typed_passes import InlineOverloads, NativeLowering, NopythonRewrites, NopythonTypeInference
+from numba.core.typeinfer import TypeInferer
 
 
 class InnerLibrary(JITCodeLibrary):
@@ -55,13 +57,58 @@ class InnerLowering(NativeLowering):
         return True
 
 
+_known: dict[Any, Any] = {}
+
+
+class Inference(TypeInferer):
+    """Type inference that asks once what a function makes of its arguments' types."""
+
+    def resolve_call(self, function: Any, args: Any, keywords: Any) -> Any:
+        """Return the signature of a call."""
+        if keywords or isinstance(function, types.BoundFunction | types.RecursiveCall | types.FunctionType):
+            return super().resolve_call(function, args, keywords)
+        key = (self.kind, id(function), *map(id, args))
+        if key not in _known:
+            found = super().resolve_call(function, args, keywords)
+            if found is None:
+                return None
+            _known[key] = found, function, args
+        return _known[key][0]
+
+
+@register_pass(mutates_CFG=True, analysis_only=False)
+class InnerInference(NopythonTypeInference):
+    _name = "inner_inference"
+
+    def run_pass(self, state: Any) -> bool:
+        """Infer the types."""
+        warnings = errors.WarningsFixer(errors.NumbaWarning)
+        infer = Inference(state.typingctx, state.func_ir, warnings)
+        infer.kind = state.flags.forceinline
+        callstack = state.typingctx.callstack
+        with callstack.register(state.targetctx.target, infer, state.func_ir.func_id, state.args), warnings:
+            for index, (name, kind) in enumerate(zip(state.func_ir.arg_names, state.args)):
+                infer.seed_argument(name, index, kind)
+            infer.build_constraint()
+            infer.propagate()
+            state.typemap, state.return_type, state.calltypes = infer.unify()
+        return True
+
+
+class InnerPasses(PassManager):
+    _ENFORCING = False
+
+
 class InnerCompiler(CompilerBase):
     """The compiler with that last pass."""
 
     def define_pipelines(self) -> list[Any]:
         """Return the usual passes but one."""
-        passes = DefaultPassBuilder.define_nopython_pipeline(self.state)
-        passes.passes = [(InnerLowering, why) if step is NativeLowering else (step, why) for step, why in passes.passes]
+        usual = DefaultPassBuilder.define_nopython_pipeline(self.state)
+        other = {NativeLowering: InnerLowering, NopythonTypeInference: InnerInference}
+        passes = InnerPasses(usual.pipeline_name)
+        for step, why in usual.passes:
+            passes.add_pass(other.get(step, step), why)
         passes.finalize()
         return [passes]
 
