@@ -9,6 +9,7 @@ looking through it again and again was a seventh of the time. The first run of a
 """
 
 import gc
+import operator
 from typing import Any
 
 from numba._dynfunc import make_function
@@ -17,7 +18,9 @@ from numba.core import errors, types
 from numba.core.compiler import CompilerBase, DefaultPassBuilder
 from numba.core.compiler_machinery import PassManager, register_pass
 from numba.core.event import Event, Listener, register
-from numba.core.typed_passes import InlineOverloads, NativeLowering, NopythonRewrites, NopythonTypeInference
+from numba.core.ir import UNDEFINED
+from numba.core.lowering import Lower
+from numba.core.typed_passes import NativeLowering, NopythonTypeInference
 from numba.core.typeinfer import TypeInferer
 
 
@@ -36,11 +39,51 @@ class InnerLibrary(JITCodeLibrary):
         self._finalized = True
 
 
+_made: dict[Any, Any] = {}
+
+
+class Lowering(Lower):
+    """Lowering that looks up once how a function is built for its arguments' types."""
+
+    def _made_for(self, function: Any, args: Any) -> Any:
+        """Return what builds a function."""
+        key = (id(function), *map(id, args))
+        if key not in _made:
+            typing = self.context.typing_context
+            kind = typing.resolve_value_type(function)
+            found = kind.get_call_type(typing, args, {})
+            _made[key] = self.context.get_function(kind, found), function, args
+        return _made[key][0]
+
+    def lower_binop(self, kind: Any, expression: Any, function: Any) -> Any:
+        """Return the value of an operation on two values."""
+        if expression.static_lhs is not UNDEFINED or expression.static_rhs is not UNDEFINED:
+            return super().lower_binop(kind, expression, function)
+        signature = self.fndesc.calltypes[expression]
+        values = [
+            self._cast_var(variable, wanted)
+            for variable, wanted in zip((expression.lhs, expression.rhs), signature.args, strict=True)
+        ]
+        value = self._made_for(function, signature.args)(self.builder, values)
+        return self.context.cast(self.builder, value, signature.return_type, kind)
+
+    def lower_getitem(self, kind: Any, expression: Any, value: Any, index: Any, signature: Any) -> Any:
+        """Return an element."""
+        values = [self._cast_var(*pair) for pair in zip((value, index), signature.args, strict=True)]
+        value = self._made_for(operator.getitem, signature.args)(self.builder, values)
+        return self.context.cast(self.builder, value, signature.return_type, kind)
+
+
 @register_pass(mutates_CFG=True, analysis_only=False)
 class InnerLowering(NativeLowering):
     """The last pass, for a function that others will have within them."""
 
     _name = "inner_lowering"
+
+    @property
+    def lowering_class(self) -> Any:
+        """What makes intermediate code of a function."""
+        return Lowering
 
     def run_pass(self, state: Any) -> bool:
         """Lower one function."""
@@ -95,6 +138,13 @@ class InnerInference(NopythonTypeInference):
         return True
 
 
+SPARED = {
+    "WithLifting", "InlineClosureLikes", "RewriteDynamicRaises", "MakeFunctionToJitFunction", "InlineInlinables",
+    "FindLiterallyCalls", "LiteralUnroll", "LiteralPropagationSubPipelinePass", "InlineOverloads", "NopythonRewrites",
+    "NoPythonSupportedFeatureValidation", "AnnotateTypes", "DumpParforDiagnostics", "RewriteSemanticConstants",
+}
+
+
 class InnerPasses(PassManager):
     _ENFORCING = False
 
@@ -108,7 +158,8 @@ class InnerCompiler(CompilerBase):
         other = {NativeLowering: InnerLowering, NopythonTypeInference: InnerInference}
         passes = InnerPasses(usual.pipeline_name)
         for step, why in usual.passes:
-            passes.add_pass(other.get(step, step), why)
+            if step.__name__ not in SPARED:
+                passes.add_pass(other.get(step, step), why)
         passes.finalize()
         return [passes]
 
