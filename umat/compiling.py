@@ -30,13 +30,37 @@ class InnerLibrary(JITCodeLibrary):
     def _optimize_functions(self, module: Any) -> None:
         """Leave it to the entry."""
 
-    def _optimize_final_module(self) -> None:
-        """Leave it to the entry."""
-
-    def _finalize_final_module(self) -> None:
-        """Make no machine code."""
+    def finalize(self) -> None:
+        """Link nothing and make no machine code."""
+        self._raise_if_finalized()
+        for library in self._linking_libraries:
+            self._reload_init.update(library._reload_init)
+        for function in self._final_module.functions:
+            if not function.is_declaration:
+                function.linkage = "linkonce_odr"
         self._finalize_dynamic_globals()
         self._finalized = True
+
+    def _get_module_for_linking(self) -> Any:
+        """Return this code with all that it calls, for an entry: what other inner code calls is not looked into."""
+        if self._shared_module is None:
+            self._ensure_finalized()
+            self._shared_module = self._final_module.clone()
+            for library in _called({self: None}):
+                inner = isinstance(library, InnerLibrary)
+                module = library._final_module if inner else library._get_module_for_linking()
+                self._shared_module.link_in(module, preserve=True)
+        return self._shared_module
+
+
+def _called(found: dict[Any, None]) -> list[Any]:
+    """Return the libraries that those found call, through inner ones; they are added to them."""
+    for library in (whole := list(found)):
+        if isinstance(library, InnerLibrary):
+            new = dict.fromkeys(other for other in library._linking_libraries if other not in found)
+            found |= new
+            whole += new
+    return whole[1:]
 
 
 _made: dict[Any, Any] = {}
