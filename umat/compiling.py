@@ -4,7 +4,7 @@ By itself numba optimises every function, links into it all that it calls and ma
 the entry runs, which has all of them within it. `InnerLibrary` leaves that to the entry. numba's passes also prepare
 for what no kernel has (`SPARED`), examine a function anew after each, and look up every operation by itself
 (`lookups`): `InnerCompiler` does without. It steps in as numba's guide to customised compilers shows, and into methods
-of the library of code. The entry's code comes out the same as by numba's own passes, but for names.
+of the library of code.
 
 A kernel that had a closure, a comprehension, a `with` or an expression of whole arrays would not compile.
 
@@ -15,6 +15,11 @@ looking through it again and again was a seventh of the time. The first run of a
 import gc
 from typing import Any
 
+from llvmlite.binding.newpassmanagers import (
+    create_new_function_pass_manager,
+    create_pass_builder,
+    create_pipeline_tuning_options,
+)
 from numba._dynfunc import make_function
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import CompilerBase, DefaultPassBuilder
@@ -30,6 +35,7 @@ SPARED = {
     "InlineOverloads", "LiteralPropagationSubPipelinePass", "LiteralUnroll", "MakeFunctionToJitFunction",
     "NoPythonSupportedFeatureValidation", "NopythonRewrites", "RewriteDynamicRaises", "WithLifting",
 }  # fmt: skip
+_TUNING = create_pipeline_tuning_options()
 
 
 class InnerLibrary(JITCodeLibrary):
@@ -38,7 +44,13 @@ class InnerLibrary(JITCodeLibrary):
     _shared_module: Any
 
     def _optimize_functions(self, ll_module: Any) -> None:
-        """Leave it to the entry."""
+        """Put variables into registers and combine instructions, once for all copies; leave the rest to the entry."""
+        ll_module.data_layout = self._codegen._data_layout
+        builder, passes = create_pass_builder(self._codegen._tm, _TUNING), create_new_function_pass_manager()
+        passes.add_sroa_pass()
+        passes.add_instruction_combine_pass()
+        for function in ll_module.functions:
+            passes.run(function, builder)
 
     def finalize(self) -> None:
         """Link nothing and make no machine code."""
