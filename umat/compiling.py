@@ -61,7 +61,7 @@ class InnerLibrary(JITCodeLibrary):
         """Link nothing and make no machine code."""
         self._raise_if_finalized()
         for library in self._linking_libraries:
-            self._reload_init.update(library._reload_init)
+            getattr(self, "_reload_init", set()).update(getattr(library, "_reload_init", ()))  # not before numba 0.62
         for function in self._final_module.functions:
             if not function.is_declaration:
                 function.linkage = "linkonce_odr"
