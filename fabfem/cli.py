@@ -7,6 +7,7 @@ command needs it.
 """
 
 import argparse
+import atexit
 import gc
 import os
 import sys
@@ -14,7 +15,7 @@ import warnings
 from collections.abc import Sequence
 
 from fabfem import __version__
-from fabfem.commands import authoring, checks, routines, runs, studies
+from fabfem.commands import authoring, checks, keys, routines, runs, studies
 from fabfem.commands.status import BAD_INPUT, DONE, INTERRUPTED, STOPPED, fail
 from fabfem.parallel.world import ended_together, launched
 
@@ -29,6 +30,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """
     options = parser().parse_args(arguments)
     gc.set_threshold(50_000, 20, 50)  # most objects of a command stay: looking through them is a tenth of a short run
+    atexit.register(gc.freeze)  # and the interpreter need not look through them once more before it leaves
     try:
         with warnings.catch_warnings(), ended_together(options.debug):
             if not options.debug:  # numbers out of all proportion overflow; what is not finite is refused with a reason
@@ -70,6 +72,6 @@ def parser() -> argparse.ArgumentParser:
     common.add_argument("--debug", action="store_true", help="show the traceback of an error")
     commands = whole.add_subparsers(title="commands", required=True, metavar="COMMAND")
     authoring.add_commands(whole, commands, common)
-    for group in (runs, studies, checks, routines):
+    for group in (keys, runs, studies, checks, routines):
         group.add_commands(commands, common)
     return whole

@@ -13,7 +13,10 @@ SCENES = {
     "element": "fabfem.laboratory.run",
     "fabric": "fabfem.fabric_tests.run",
 }
-"""Module that runs each kind of scene; it has `describe(case)` and `run(case, folder, quiet, timer, restart)`."""
+"""Module that runs each kind of scene.
+
+It has `describe(case)`, `run(case, folder, quiet, timer, restart)`, `price(case, pilot)` and `remember(case, folder)`.
+"""
 
 
 def run_case(source: Case | Path, folder: Path, quiet: bool = False, restart: Restart = FRESH) -> Outcome:
@@ -50,23 +53,27 @@ def describe_case(case: Case) -> Description:
     return _scene(case).describe(case)
 
 
-def price_case(case: Case) -> str:
-    """Return what a run of a case will cost in time, in words; nothing where its kind of scene cannot tell.
+def price_case(case: Case, pilot: bool) -> str:
+    """Return what a run of a case will cost in time, in words; nothing where no run of its kind has been measured.
+
+    Parameters
+    ----------
+    case : Case
+        What would be run.
+    pilot : bool
+        Measure the beginning of a run where none of its kind has been.
 
     Raises
     ------
     CaseError
         If the case cannot be run.
     """
-    scene = _scene(case)
-    return scene.price(case) if hasattr(scene, "price") else ""
+    return str(_scene(case).price(case, pilot))
 
 
 def remember_cost(case: Case, folder: Path) -> None:
     """Keep what the completed run in a folder has cost, for the price of the next one of its kind."""
-    scene = _scene(case)
-    if hasattr(scene, "remember"):
-        scene.remember(case, folder)
+    _scene(case).remember(case, folder)
 
 
 def replay_case(case: Case, start: Any) -> tuple[tuple[str, float, str] | None, list[str]]:

@@ -18,7 +18,7 @@ from fabfem.case import materials as said
 from fabfem.case import suggest
 from fabfem.units import Units
 from umat import fabric as laws
-from umat.directions import Directions, directions, mirrored
+from umat.directions import Directions, directions, mirrored, rotated, rotation
 from umat.mandel import Array, from_tensor
 
 
@@ -110,7 +110,7 @@ def _(table: said.Umat, around: Surroundings) -> Substance:
 @substance.register
 def _(table: said.ChangHicher, around: Surroundings) -> Substance:
     fabric = deposit(table.fabric, around.vertical)
-    rule, saved = rule_for(table.directions, around.flat and _mirrored(fabric))
+    rule, saved = rule_for(table.directions, around.flat and _mirrored(fabric), table.turn)
     material = _sand(table, around.units)
     frozen = () if table.fabric and table.fabric.law != "constant" else ("no evolution of the fabric: it is frozen",)
     return Substance(material, rule, {"void_ratio": table.void_ratio, "fabric": fabric}, (*saved, *frozen))
@@ -140,12 +140,14 @@ def _mirrored(fabric: Array) -> bool:
     return bool(np.abs(fabric[[3, 4]]).max() <= 1e-12)
 
 
-def rule_for(name: str, flat: bool) -> tuple[Directions, tuple[str, ...]]:
+def rule_for(name: str, flat: bool, turn: said.Turn | None = None) -> tuple[Directions, tuple[str, ...]]:
     """Return the contact directions, those equal by mirror symmetry stored once, and a sentence that says so."""
     try:
         whole = directions(name)
     except ValueError as error:
         raise MisfitError("directions", str(error)) from error
+    if turn is not None:
+        whole = rotated(whole, rotation(turn.axis, turn.angle))
     if not flat:
         return whole, ()
     try:

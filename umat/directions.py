@@ -28,7 +28,8 @@ _TABLES = {
     "bazant_oh_37": ("sphere_BO37.csv", 11),
     "icosahedral_61": ("sphere_ICO61.csv", 15),
 }
-_FAMILIES = ("lebedev_<degree>", "gauss_<n_theta>x<n_phi>")
+NAMES = (*_TABLES, "lebedev_<degree>", "gauss_<n_theta>x<n_phi>")
+"""Names of rules and families of rules."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,8 +78,7 @@ def directions(name: str) -> Directions:
     n_theta, cross, n_phi = size.partition("x")
     if family == "gauss" and cross and n_theta.isdecimal() and n_phi.isdecimal():
         return gauss(int(n_theta), int(n_phi))
-    known = ", ".join([*_TABLES, *_FAMILIES])
-    raise ValueError(f"no directions are called {name!r}; there are {known}")
+    raise ValueError(f"no directions are called {name!r}; there are {', '.join(NAMES)}")
 
 
 def lebedev(degree: int) -> Directions:
@@ -125,6 +125,15 @@ def rotated(rule: Directions, matrix: ArrayLike) -> Directions:
         raise ValueError(f"{rule.name} is mirrored; turn the half sphere, then mirror it")
     normals = np.ascontiguousarray(rule.normals @ np.asarray(matrix, dtype=float).T)
     return Directions(normals, rule.weights, f"{rule.name} rotated", rule.degree)
+
+
+def rotation(axis: Axis, degrees: float) -> np.ndarray:
+    """Return the (3, 3) right-handed rotation about an axis."""
+    first, second = (np.roll(range(3), -AXES.index(axis))[1:]).tolist()
+    matrix = np.eye(3)
+    c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
+    matrix[np.ix_([first, second], [first, second])] = [[c, -s], [s, c]]
+    return matrix
 
 
 def mirrored(rule: Directions, axis: Axis = "z") -> Directions:

@@ -42,10 +42,10 @@ def describe(case: BoundaryValueCase) -> Description:
     return Description(problem.omitted, tuple(remaining(problem.model)), memory(problem.model))
 
 
-def price(case: BoundaryValueCase) -> str:
-    """Return what a run of a case will cost, in a sentence; `CaseError` if it cannot be run."""
-    cost = price_of(build(case))
-    return f"about {duration(cost.seconds)}, judged by {cost.source}"
+def price(case: BoundaryValueCase, pilot: bool) -> str:
+    """Return what a run of a case will cost, in a sentence; nothing where that is not known without a pilot."""
+    cost = price_of(build(case), pilot)
+    return f"about {duration(cost.seconds)}, judged by {cost.source}" if cost else ""
 
 
 def remember(case: BoundaryValueCase, folder: Path) -> None:

@@ -116,6 +116,15 @@ class Fabric(Table):
         return norm
 
 
+class Turn(Table):
+    """The rule of contact directions turned as a whole, such as into the frame of the stress to come."""
+
+    axis: Literal["x", "y", "z"]
+    """Axis of the rotation; z for a plane mesh, y from the vertical towards x in an element test."""
+    angle: Angle
+    """Right-handed angle of the rotation [degree]."""
+
+
 class ChangHicher(Material):
     """The fabric-enhanced micromechanical model of granular soil."""
 
@@ -126,6 +135,8 @@ class ChangHicher(Material):
     """Initial void ratio (e)."""
     directions: Text = "bazant_oh_37"
     """Rule of contact directions; an element test takes gauss_16x20 when left out."""
+    turn: Turn | None = None
+    """Rotation of that rule; without it the rule stands in the axes of the scene."""
     localisation: Literal["total", "rate"] = "total"
     """How contact forces follow the stress: from its total, or accumulated from its rate."""
     parameters: dict[str, float] = Field(default={})

@@ -11,6 +11,9 @@ if TYPE_CHECKING:
     from fabfem.case import Case
 
 
+UNKNOWN = "not known before a run of this kind; --price measures the beginning of one"
+
+
 def add_commands(commands: argparse._SubParsersAction, common: argparse.ArgumentParser) -> None:
     """Add the commands to those of a parser."""
     solve = commands.add_parser("solve", parents=[common], help="run a case and write its results")
@@ -23,7 +26,7 @@ def add_commands(commands: argparse._SubParsersAction, common: argparse.Argument
 
     check = commands.add_parser("check", parents=[common], help="validate a case and say what its scene leaves out")
     check.add_argument("case", type=Path, metavar="CASE.toml")
-    check.add_argument("--price", action="store_true", help="predict the time; the first of its kind runs for 10 s")
+    check.add_argument("--price", action="store_true", help="measure the time of a kind of run not seen before")
     check.set_defaults(command=_check, shared=True)
 
     show = commands.add_parser("show", parents=[common], help="draw pictures of a result")
@@ -73,9 +76,8 @@ def _check(options: argparse.Namespace) -> int:
     if first() and not options.quiet:
         print(resolved(case))
         print("# What the scene leaves out:", *description.omitted, sep="\n#   ")
-        cost = price_case(case) if options.price else ""
-        remains = (*description.remains, *([("time", cost)] if cost else []))
-        print("# What remains:\n" + summary(remains, prefix="#   "))
+        cost = price_case(case, options.price) or UNKNOWN
+        print("# What remains:\n" + summary((*description.remains, ("time", cost)), prefix="#   "))
     return DONE
 
 

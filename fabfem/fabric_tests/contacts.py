@@ -38,7 +38,8 @@ def measure(drive: said.Contacts, case: FabricCase) -> Measured:
         tuple(f"{name} [{unit}{'2' * (place > 1)}]" for place, name in enumerate(JOINT)) if stress is not None else ()
     )
     headers = (PLANE if normals.shape[1] == 2 else SPACE) + joint
-    return Measured(headers, _blocks(normals, stress), (("contacts", str(len(normals))),))
+    counts = _counts(len(normals))
+    return Measured(headers, _blocks(normals, stress, counts), len(counts), (("contacts", str(len(normals))),))
 
 
 def _read(drive: said.Contacts, case: FabricCase) -> Array:
@@ -73,9 +74,13 @@ def _drawn(drive: said.Contacts, case: FabricCase) -> Array:
     return draw_3d(fabric, drive.count, drive.seed)
 
 
-def _blocks(normals: Array, stress: Array | None) -> Iterator[Block]:
+def _counts(whole: int) -> list[int]:
+    """Return growing numbers of contacts up to all of them."""
     decades = [m * 10**k for k in range(1, 9) for m in (1, 2, 5)]
-    counts = [count for count in decades if count < len(normals)] + [len(normals)]
+    return [count for count in decades if count < whole] + [whole]
+
+
+def _blocks(normals: Array, stress: Array | None, counts: list[int]) -> Iterator[Block]:
     one = _plane if normals.shape[1] == 2 else _space
     for count in counts:
         row, summary = one(normals[:count], stress)

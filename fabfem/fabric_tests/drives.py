@@ -11,7 +11,7 @@ Value = str | int | float
 
 
 class Block(NamedTuple):
-    """Rows of the history that belong together."""
+    """Rows of the history that belong together, such as those of a curve."""
 
     rows: list[tuple[Value, ...]]
     """Values of the columns; empty text where a value is undefined."""
@@ -28,6 +28,8 @@ class Measured(NamedTuple):
     """Name and unit of each column."""
     blocks: Iterator[Block]
     """Its rows, computed as they are asked for."""
+    size: int
+    """Number of blocks."""
     remains: tuple[tuple[str, str], ...]
     """Name and size of what is computed."""
 

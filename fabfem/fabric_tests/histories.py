@@ -48,7 +48,7 @@ def measure(drive: said.History | said.Loading, case: FabricCase) -> Measured:
     size = sum(len(group.labels) for group in groups)
     records = sum(len(group.labels) * len(group.given.stress) for group in groups)
     remains = (("laws", str(len(laws))), ("histories", str(size)), ("records", str(records)))
-    return Measured((*LABELS, *headers(case.unit_system)), _blocks(case, laws, groups), remains)
+    return Measured((*LABELS, *headers(case.unit_system)), _blocks(case, laws, groups), len(laws) * size, remains)
 
 
 def _blocks(case: FabricCase, laws: tuple[Curve, ...], groups: tuple[Group, ...]) -> Iterator[Block]:

@@ -31,7 +31,8 @@ def measure(drive: said.Probe, case: FabricCase) -> Measured:
     stress = np.array(drive.stress) * FACTOR
     starts = [start(case, curve, stress[None])[0] for curve in laws]
     count = drive.directions * drive.inclinations
-    return Measured(HEADERS, _blocks(drive, stress, laws, starts), (("laws", str(len(laws))), ("probes", str(count))))
+    remains = (("laws", str(len(laws))), ("probes", str(count)))
+    return Measured(HEADERS, _blocks(drive, stress, laws, starts), len(laws), remains)
 
 
 def probes(directions: int, inclinations: int) -> tuple[Array, Array, Array]:

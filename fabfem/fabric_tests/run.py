@@ -1,20 +1,25 @@
 """A case on fabric laws from the case to the last row: its one drive makes a table, which is written block by block."""
 
+import json
+from collections.abc import Iterator
 from functools import singledispatch
 from pathlib import Path
 from typing import Any
 
 from fabfem.case import CaseError, FabricCase
 from fabfem.case import fabric as said
-from fabfem.fabric_tests.drives import Measured, Value
+from fabfem.fabric_tests.drives import Block, Measured, Value
+from fabfem.fabric_tests.price import price as price_of
+from fabfem.fabric_tests.price import remember as remember_run
 from fabfem.outcome import Description, Outcome, claimed, short, unwritten
 from fabfem.output.history import History
 from fabfem.output.interrupt import held_back
 from fabfem.output.report import Report
+from fabfem.rates import duration
 from fabfem.restart import FRESH, Restart
 from fabfem.timing import Timer
 
-PHASES = ("laws", "output")
+PHASES = ("start", "curves", "output")
 OMITTED = ("no stress point: the laws do not act back on the stress and strain that they are given",)
 
 
@@ -57,6 +62,17 @@ def describe(case: FabricCase) -> Description:
     return Description(OMITTED, measure(case.drive, case).remains)
 
 
+def price(case: FabricCase, pilot: bool) -> str:
+    """Return what a run of a case will cost, in a sentence; nothing where that is not known without a pilot."""
+    cost = price_of(case, measure(case.drive, case), pilot)
+    return f"about {duration(cost.seconds)}, judged by {cost.source}" if cost else ""
+
+
+def remember(case: FabricCase, folder: Path) -> None:
+    """Keep what a completed run has cost, for the price of the next one of its kind."""
+    remember_run(case, json.loads((folder / "report.json").read_text(encoding="utf-8")))
+
+
 def run(case: FabricCase, folder: Path, quiet: bool, timer: Timer | None = None, restart: Restart = FRESH) -> Outcome:
     """Run a case and write its results into a folder; see `fabfem.run.run_case`.
 
@@ -65,7 +81,7 @@ def run(case: FabricCase, folder: Path, quiet: bool, timer: Timer | None = None,
     if restart.branch is not None:
         raise CaseError(f"{case.path.name}: scene.kind: a fabric scene keeps no state to branch from")
     timer = timer or Timer(PHASES)
-    with timer.phase("laws"):
+    with timer.phase("start"):
         measured = measure(case.drive, case)
     with claimed(folder):
         try:
@@ -84,8 +100,9 @@ def _recorded(case: FabricCase, folder: Path, measured: Measured, timer: Timer) 
     last: tuple[Value, ...] = ()
     reasons: list[str] = []
     try:
-        for block in measured.blocks:
-            with held_back():
+        blocks = iter(measured.blocks)
+        while block := _next(blocks, timer):
+            with held_back(), timer.phase("output"):
                 for last in block.rows:
                     history.write(last)
                 count += len(block.rows)
@@ -97,9 +114,16 @@ def _recorded(case: FabricCase, folder: Path, measured: Measured, timer: Timer) 
     history.close()
     reason = "; ".join(reasons)
     report.end(status, reason)
+    report.content["processor_time"] = timer.processor()
     report.write({**timer.spent, "total": timer.total()})
     shown = tuple((header, short(value)) for header, value in zip(measured.headers, last, strict=False) if value != "")
     return Outcome(status, reason, folder, count, shown, timer.total())
+
+
+def _next(blocks: Iterator[Block], timer: Timer) -> Block | None:
+    """Compute a block; None after the last."""
+    with timer.phase("curves"):
+        return next(blocks, None)
 
 
 def _head(case: FabricCase, measured: Measured) -> dict[str, Any]:

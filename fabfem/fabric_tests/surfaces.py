@@ -19,7 +19,8 @@ def measure(drive: said.Surface, case: FabricCase) -> Measured:
     for curve in laws:
         with blamed(case, f"law.{curve.name}"):
             critical_state(curve.law, 0.0)
-    return Measured(HEADERS, _blocks(drive, laws), (("laws", str(len(laws))), ("angles", str(drive.angles))))
+    remains = (("laws", str(len(laws))), ("angles", str(drive.angles)))
+    return Measured(HEADERS, _blocks(drive, laws), len(laws), remains)
 
 
 def _blocks(drive: said.Surface, laws: tuple[Curve, ...]) -> Iterator[Block]:

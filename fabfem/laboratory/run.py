@@ -40,9 +40,11 @@ def describe(case: ElementCase) -> Description:
     return Description(specimen.omitted, tuple(_remaining(specimen)))
 
 
-def price(case: ElementCase) -> str:
-    """Return what a run of a case will cost, in a sentence; `CaseError` if it cannot be run."""
-    cost = price_of(build(case))
+def price(case: ElementCase, pilot: bool) -> str:
+    """Return what a run of a case will cost, in a sentence; nothing where that is not known without a pilot."""
+    cost = price_of(build(case), pilot)
+    if cost is None:
+        return ""
     return f"about {duration(cost.seconds)}, {cost.evaluations:.2g} evaluations, judged by {cost.source}"
 
 

@@ -20,6 +20,8 @@ from umat.cache import FOLDER, user_cache
 HOME = Path(__file__).parents[2]
 CASES = (
     *sorted(f"element/{path.stem}" for path in (HOME / "cases" / "element").glob("*.toml")),
+    *("fabric/all_laws", "fabric/contacts_3d", "fabric/critical_surfaces", "fabric/probe_2d_isobaric"),
+    *("fabric/yuan_8_11_dense", "fabric/yuan_13_creation"),
     *("studies/lame", "studies/strip_von_mises", "studies/strip_prandtl", "hollow_cylinder/torsion"),
     *("hollow_cylinder/thin_wall", "footing/eccentric_clay", "footing/inclined_clay", "slope/griffiths_lane_1"),
     *("specimen/biaxial_band", "footing/strip_toyoura"),

@@ -8,10 +8,10 @@ import pytest
 
 from fabfem.boundary_value.problem import build
 from fabfem.case import CaseError, case_from, read_case
-from fabfem.case.materials import Fabric
+from fabfem.case.materials import Fabric, Turn
 from fabfem.fem.loads import Gravity, Pressure
 from fabfem.substance import deposit, rule_for
-from umat.directions import directions
+from umat.directions import directions, rotation
 from umat.mandel import norm, to_tensor, trace
 
 
@@ -42,6 +42,16 @@ def test_directions_equal_by_symmetry_are_stored_once_and_said_to_be() -> None:
     assert f"{37 - len(rule)} of 37 contact directions" in said[0]
     whole, silent = rule_for("bazant_oh_37", flat=False)
     assert (len(whole), silent) == (37, ())
+
+
+def test_a_rule_turned_in_the_plane_of_a_flat_mesh_is_still_mirrored() -> None:
+    turn = Turn(axis="z", angle=45.0)
+    whole, _ = rule_for("lebedev_17", flat=False, turn=turn)
+    half, _ = rule_for("lebedev_17", flat=True, turn=turn)
+    np.testing.assert_allclose(whole.normals, directions("lebedev_17").normals @ rotation("z", 45.0).T)
+    assert (len(whole), len(half)) == (55, 31)
+    upright, _ = rule_for("lebedev_17", flat=True, turn=Turn(axis="x", angle=30.0))
+    assert len(upright) == 55
 
 
 def test_loads_stay_until_a_stage_changes_them(folder: Path) -> None:

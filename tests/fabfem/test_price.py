@@ -7,9 +7,11 @@ import pytest
 
 from fabfem.boundary_value.price import expected, measured, predicted, price, remember, stored
 from fabfem.boundary_value.problem import build
-from fabfem.case import BoundaryValueCase, ElementCase, read_case
+from fabfem.case import BoundaryValueCase, ElementCase, FabricCase, read_case
 from fabfem.cli import main
 from fabfem.commands.status import DONE
+from fabfem.fabric_tests import price as fabric
+from fabfem.fabric_tests.run import measure
 from fabfem.laboratory import price as element
 from fabfem.laboratory.specimen import Specimen
 from fabfem.laboratory.specimen import build as build_specimen
@@ -52,18 +54,23 @@ def test_a_finer_mesh_and_smaller_increments_cost_more(case: BoundaryValueCase) 
 def test_rates_are_measured_at_first_use_and_bettered_by_a_run(
     case: BoundaryValueCase, capsys: pytest.CaptureFixture[str]
 ) -> None:
+    assert price(build(case), pilot=False) is None
+    assert main(["check", str(case.path)]) == DONE
+    assert "not known before a run of this kind" in capsys.readouterr().out
     first = price(build(case))
+    assert first is not None
     assert first.seconds > 0.0
     assert "first increments" in first.source
     folder = case.path.parent / "out"
     assert main(["solve", str(case.path), "--out", str(folder), "--quiet"]) == DONE
-    again = price(build(case))
+    again = price(build(case), pilot=False)
+    assert again is not None
     assert "a run of this kind" in again.source
     report = json.loads((folder / "report.json").read_text(encoding="utf-8"))
     took = report["processor_time"]
     assert 0.0 < again.seconds - took["start"] <= 1.01 * report["wall_time"]["total"]
     assert again.seconds >= 0.9 * min(took["start"] + took["run"], report["wall_time"]["total"])
-    assert main(["check", str(case.path), "--price"]) == DONE
+    assert main(["check", str(case.path)]) == DONE
     assert "judged by a run of this kind" in capsys.readouterr().out
 
 
@@ -147,5 +154,47 @@ def test_rates_of_an_element_test_are_measured_and_bettered(
     longer = path.with_name("longer.toml")
     longer.write_text(ELEMENT.replace("cycles = 3", "cycles = 30"), encoding="utf-8")
     assert element.price(specimen_of(longer)).evaluations == pytest.approx(again.evaluations * 1208 / 128, rel=1e-6)
-    assert main(["check", str(path), "--price"]) == DONE
+    assert main(["check", str(path)]) == DONE
     assert "judged by a run of this kind" in capsys.readouterr().out
+
+
+FABRIC = """
+[scene]
+kind = "fabric"
+
+[law.one]
+law = "zhao_kruyt"
+
+[law.other]
+law = "yuan"
+
+[surface]
+angles = 41
+"""
+
+
+def test_a_case_on_fabric_laws_is_priced_by_its_curves(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    path = tmp_path / "surface.toml"
+    path.write_text(FABRIC, encoding="utf-8")
+    assert main(["check", str(path)]) == DONE
+    assert "not known before a run of this kind" in capsys.readouterr().out
+    assert main(["check", str(path), "--price"]) == DONE
+    assert "judged by its first curves" in capsys.readouterr().out
+    assert main(["solve", str(path), "--out", str(tmp_path / "out"), "--quiet"]) == DONE
+    case = read_case(path)
+    assert isinstance(case, FabricCase)
+    measured = measure(case.drive, case)
+    again = fabric.price(case, measured, pilot=False)
+    assert again is not None
+    report = json.loads((tmp_path / "out" / "report.json").read_text(encoding="utf-8"))
+    spent, took = report["wall_time"], report["processor_time"]
+    assert sum(spent[phase] for phase in ("start", "curves", "output")) <= spent["total"]
+    assert again.seconds == pytest.approx(took["start"] + min(took["run"], spent["total"]), rel=0.01)
+    rates = fabric.stored(case)
+    assert rates is not None
+    more = fabric.price(case, measured._replace(size=20), pilot=False)
+    assert more is not None
+    assert more.seconds - again.seconds == pytest.approx(18 * rates.block)

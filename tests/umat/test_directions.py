@@ -13,6 +13,7 @@ from umat.directions import (
     gauss,
     mirrored,
     rotated,
+    rotation,
 )
 from umat.mandel import from_tensor
 
@@ -84,6 +85,11 @@ def test_no_direction_is_there_twice(name):
     normals = directions(name).normals
     cosines = abs(normals @ normals.T) - 2 * np.eye(len(normals))
     assert cosines.max() < 1 - 1e-6
+
+
+@pytest.mark.parametrize("axis", "xyz")
+def test_a_rotation_is_right_handed(axis):
+    np.testing.assert_allclose(rotation(axis, 33.0), Rotation.from_euler(axis, 33.0, degrees=True).as_matrix())
 
 
 @every_rule
