@@ -12,8 +12,8 @@ from umat.directions import directions
 from umat.fabric import LAWS
 from umat.sands import toyoura
 
-sys.path.append(str(Path(__file__).parents[1] / "umat"))
-from regimes import REGIMES, difference_errors, regimes_of, taylor_orders
+sys.path.append(str(Path(__file__).parents[2]))
+from tests.umat.regimes import REGIMES, difference_errors, regimes_of, taylor_orders
 
 
 def main() -> None:

@@ -4,9 +4,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from regimes import FABRIC, Regimes, regimes_of
 
 import umat
+from tests.umat.regimes import FABRIC, Regimes, regimes_of
 from umat import mandel
 from umat.chang_hicher import ChangHicher
 from umat.directions import Directions, directions

@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
-from regimes import difference_errors, taylor_orders
 
 import umat
+from tests.umat.regimes import difference_errors, taylor_orders
 from umat import mandel
 
 
