@@ -1,7 +1,12 @@
 """What ``[solver] diagnose = true`` records of the stiffness at the end of every increment, a column each.
 
-Both are those of `fabfem.fem.diagnosis`; each increment pays for one more factorisation.
+Both are those of `fabfem.fem.diagnosis`; each increment pays for one more factorisation. Several ranks have the
+condition alone: MUMPS solves with its factors, and with their transposes, but does not tell their entries.
 """
+
+from typing import Any
+
+import numpy as np
 
 from fabfem.boundary_value.probes import Column
 from fabfem.fem.diagnosis import Condition, condition
@@ -27,13 +32,16 @@ class Conditioning:
     def _found(self, increment: Increment) -> Condition:
         system = self._systems[increment.stage_index]
         wet = None if system.water is None else system.water.matrix(increment.size)
-        return condition(whole(system.reduction.stiffness(increment.tangent, wet), system.solver.triangle))
+        matrix = system.reduction.stiffness(increment.tangent, wet)
+        if system.space.mesh.ranks.size > 1:
+            solver: Any = system.solver  # several ranks have PETSc's
+            return Condition(solver.condition(matrix), np.nan)
+        return condition(whole(matrix, system.solver.triangle))
 
 
 def conditioning_columns(model: Model) -> tuple[Column, ...]:
-    """Return the columns ``condition_number`` and ``pivot_growth``."""
+    """Return the columns ``condition_number`` and, of one rank, ``pivot_growth``."""
     found = Conditioning(model)
-    return (
-        Column("condition_number", "-", "", lambda increment: found.of(increment).number),
-        Column("pivot_growth", "-", "", lambda increment: found.of(increment).growth),
-    )
+    number = Column("condition_number", "-", "", lambda increment: found.of(increment).number)
+    growth = Column("pivot_growth", "-", "", lambda increment: found.of(increment).growth)
+    return (number,) if model.space.mesh.ranks.size > 1 else (number, growth)

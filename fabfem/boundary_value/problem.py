@@ -87,7 +87,7 @@ def build(case: BoundaryValueCase) -> Problem:
         found = (*found, *hollow_cylinder_columns(case, space))
     with _blamed(case, "errors"):
         errors, mesh_error = error_columns(case, model, lambda rule: _with_rule(case, space, rule))
-    diagnosed = _diagnosed(case, model) if case.solver.diagnose else ()
+    diagnosed = conditioning_columns(model) if case.solver.diagnose else ()
     if case.solver.threads and not shared(case):
         umat.set_threads(case.solver.threads)
     omitted = tuple(left_out(case, space, known, substances))
@@ -158,12 +158,6 @@ def _zones(case: BoundaryValueCase, name: str, space: Space, filling: Substance)
         with _blamed(case, f"material.{name}"):
             state = umat.initial_state(filling.material, filling.directions, stress, **filling.needs)
         yield zone, Zone(filling.material, filling.directions, state, space.points_of(space.mesh.zone(zone)))
-
-
-def _diagnosed(case: BoundaryValueCase, model: Model) -> tuple[Column, ...]:
-    if model.space.mesh.ranks.size > 1:
-        raise CaseError(f"{case.path.name}: solver.diagnose: the condition is found by one process with the whole mesh")
-    return conditioning_columns(model)
 
 
 def _stages(

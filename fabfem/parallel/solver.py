@@ -6,9 +6,8 @@ owns, displacements first, then pressures; the first rank also those of the moti
 
 Multigrid smooths aggregates of nodes (GAMG) and is told the rigid motions as the near null space [Vaněk, Mandel &
 Brezina 1996]; with pore pressure the two fields are split, the pressure's Schur complement approximated with the
-diagonal of the stiffness. Its solves are as exact as the Newton iteration can use [Eisenstat & Walker 1996]: the
-residual is to fall to GAMMA times the square of what the last correction left of the out-of-balance force, within
-(LEAST, MOST). Where it does not converge, as the tangent of a body that fails, that one solve is MUMPS's.
+diagonal of the stiffness. Its solves are as exact as the Newton iteration can use (`forcing`). Where it does not
+converge, as the tangent of a body that fails, that one solve is MUMPS's.
 """
 
 from collections.abc import Mapping
@@ -23,10 +22,10 @@ from fabfem.fem.linear import OVERFLOW, POOR, REFINEMENTS, USELESS, Solution
 from fabfem.fem.pores import PorousSpace
 from fabfem.fem.space import Space
 from fabfem.fem.supports import Constraints
+from fabfem.parallel.condition import condition_number
+from fabfem.parallel.forcing import MOST, forcing
 from fabfem.parallel.rows import Rows
 
-GAMMA, LEAST, MOST = 0.5, 1e-8, 1e-3
-"""Factor and bounds of the tolerance of an iterative solve."""
 DIRECT: dict[str, Any] = {
     "ksp_type": "preonly",
     "pc_type": "lu",
@@ -86,7 +85,8 @@ class PetscSolver:
         self._space = space
         self._matrix: PETSc.Mat | None = None
         self._ksp: PETSc.KSP | None = None
-        self._failure, self._last = "no matrix was given", 0.0
+        self._failure = "no matrix was given"
+        self._new, self._last, self._wanted = True, 0.0, MOST
 
     def factor(self, matrix: csr_matrix) -> None:
         """Take a new matrix, this rank's share of it; a failure shows in the next `solve`."""
@@ -95,6 +95,7 @@ class PetscSolver:
         if not finite:
             return
         _release_others(self)
+        self._new = True
         self._matrix = self._rows.matrix(matrix, self._matrix)
         if self._ksp is not None:
             self._ksp.setOperators(self._matrix)
@@ -117,6 +118,16 @@ class PetscSolver:
         what = f"residual {residual:.1e}" if growth == np.inf else f"it moves {growth:.1e} times too far"
         return Solution(nothing, residual, False, f"the stiffness matrix is singular or nearly so ({what})")
 
+    def condition(self, matrix: csr_matrix) -> float:
+        """Return the condition number of a matrix, scaled to a unit diagonal; infinite where it is singular."""
+        self.factor(matrix)
+        if self._failure or self._matrix is None:
+            return np.inf
+        ksp = self._made(multigrid=False)
+        number = condition_number(self._matrix, ksp, self._space.mesh.ranks)
+        ksp.destroy()
+        return number
+
     def release(self) -> None:
         """Give back the matrix and its factors."""
         for thing in (self._ksp, self._matrix):
@@ -125,11 +136,16 @@ class PetscSolver:
         self._ksp = self._matrix = None
 
     def _tolerance(self, size: float) -> float:
-        """Return the relative residual that is asked of an iterative solve; a direct one's is its own affair."""
+        """Return the relative residual that is asked of an iterative solve; a direct one's is its own affair.
+
+        The first solve with a matrix is for the out-of-balance force; another, as for the load that a control scales,
+        is as exact.
+        """
         if not self._settings.multigrid:
             return 0.0
-        left, self._last = (size / self._last if self._last else 1.0), size
-        return float(np.clip(GAMMA * left**2, LEAST, MOST))
+        if self._new:
+            self._wanted, self._last, self._new = forcing(size, self._last), size, False
+        return self._wanted
 
     def _solved(self, b: PETSc.Vec, size: float, wanted: float) -> tuple[PETSc.Vec, float]:
         """Return the solution and its relative residual: of the iteration, else refined once by a direct solver."""

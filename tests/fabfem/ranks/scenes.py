@@ -183,6 +183,12 @@ fields = ["stress", "discretisation_error"]
 """
 )
 """Sand that says how wrong it is: patches and samples that do not care where the mesh is divided."""
+FAILS = (
+    SURE[: SURE.index("[errors]")] + SURE[SURE.index("[[stage]]") : SURE.index("[output]")]
+).replace("x = 12.0, y = -10.0", "x = 90.0, y = -10.0").replace(
+    "initial = 0.25, maximum", "initial = 0.25, minimum = 0.05, maximum"
+)  # fmt: skip
+"""The same sand sheared beyond its strength: increments that are halved, and a reason with a place."""
 SCENES = {
     "dry": DRY,
     "sure": SURE,
@@ -192,10 +198,13 @@ SCENES = {
     "body": BODY,
     "arc": ARC,
     "weak": WEAK,
+    "fails": FAILS,
 }
 SCENES |= {
     "multigrid": SOLID + '[solver]\nlinear = "multigrid"\ntolerance = 1e-8\n',
+    "held": BODY + '[solver]\nlinear = "multigrid"\ntolerance = 1e-8\n',
     "options": SOLID + '[solver]\nlinear = "multigrid"\npetsc = { ksp_max_it = 1 }\n',
+    "ill": DRY + "[solver]\ndiagnose = true\n",
     "split": WET + '[solver]\nlinear = "multigrid"\ntolerance = 1e-8\n',
 }
 

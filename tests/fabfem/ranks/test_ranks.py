@@ -7,15 +7,19 @@ their Python packages what needs them is passed over, and the report says so.
 import csv
 import json
 import os
+import re
 import shutil
 import subprocess
 import sys
 from importlib.util import find_spec
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from scenes import SCENES
+
+from fabfem.parallel.forcing import LEAST, MOST, forcing
 
 HERE = Path(__file__).parent
 MISSING = [name for name in ("mpi4py", "petsc4py") if not find_spec(name)]
@@ -26,7 +30,7 @@ CALM = {
     **{"OMPI_MCA_rmaps_base_oversubscribe": "1", "OMPI_MCA_hwloc_base_binding_policy": "none"},
 }
 """Lets Open MPI start more processes than there are cores, as root in a container too."""
-EXACT = [name for name in SCENES if name not in ("multigrid", "options", "split")]
+EXACT = [name for name in SCENES if name not in ("multigrid", "held", "options", "split", "ill")]
 
 
 def started(ranks: int, *words: str | Path) -> subprocess.CompletedProcess[str]:
@@ -85,7 +89,49 @@ def test_two_ranks_write_the_history_of_one_process(name: str, alone: Path, shar
 
 
 @needs_mpi
-@pytest.mark.parametrize(("name", "direct"), [("multigrid", "solid"), ("split", "wet")])
+def test_three_ranks_write_it_too(alone: Path, tmp_path: Path) -> None:
+    names = ["arc", "weak", "wet", "fails"]
+    done = ran(tmp_path, 3, names)
+    assert done.returncode == 0, done.stderr
+    assert [name for name in names if max(apart(alone / name, tmp_path / name).values()) >= 1e-8] == []
+
+
+def told(folder: Path) -> dict[str, Any]:
+    """Return the report of a run."""
+    return json.loads((folder / "report.json").read_text(encoding="utf-8"))
+
+
+@needs_mpi
+def test_the_scenes_go_the_ways_that_are_compared(shared: Path) -> None:
+    """Stages, water that is shut in and then flows, an arc, a collapse, increments that are halved."""
+    assert set(table(shared / "dry")[1]) == {"ground", "push"}
+    header, stages, rows = table(shared / "wet")
+    pressure = rows[:, header.index("pressure [kPa]")]
+    assert pressure[stages.index("wait") - 1] == pytest.approx(20.0, rel=0.01), "water bears what is put on it"
+    assert np.ptp(pressure[stages.index("wait") :]) > 0.05, "and goes where there is less of it"
+    header, stages, rows = table(shared / "arc")
+    steps = np.diff(rows[:4, header.index("load_factor [-]")], prepend=0.0)
+    assert (steps > 0.0).all(), "pushed on"
+    assert steps[3] < 0.1 * steps[0], "the arc is long where the load hardly rises"
+    safety = told(shared / "weak")["factor_of_safety"]
+    assert 0.0 < safety["first_failure"] - safety["last_equilibrium"] < 0.11
+    assert told(shared / "wet")["cutbacks"]
+
+
+@needs_mpi
+def test_a_run_that_stops_does_so_at_the_same_place_with_the_same_reason(alone: Path, shared: Path) -> None:
+    one, other = told(alone / "fails"), told(shared / "fails")
+    assert (one["status"], len(one["cutbacks"]) > 1) == ("stopped", True)
+    residual = re.compile(r"[\d.]+e[+-]\d+")  # of an iteration that goes nowhere
+    assert residual.sub("", other["reason"]) == residual.sub("", one["reason"])
+    kept = ("stage", "fraction", "size", "point")
+    assert [[cut[key] for key in kept] for cut in other["cutbacks"]] == [
+        [cut[key] for key in kept] for cut in one["cutbacks"]
+    ]
+
+
+@needs_mpi
+@pytest.mark.parametrize(("name", "direct"), [("multigrid", "solid"), ("held", "body"), ("split", "wet")])
 def test_multigrid_finds_what_the_direct_solver_finds(name: str, direct: str, alone: Path, shared: Path) -> None:
     found = {name: gap for name, gap in apart(alone / direct, shared / name).items() if not name.startswith("iter")}
     assert max(found.values()) < 1e-5
@@ -95,10 +141,93 @@ def test_multigrid_finds_what_the_direct_solver_finds(name: str, direct: str, al
 
 
 @needs_mpi
+def test_an_iterative_solve_is_as_exact_as_newton_s_iteration_can_use(tmp_path: Path) -> None:
+    """PETSc is handed tolerances that fall with the out-of-balance force, the same on both ranks."""
+    (tmp_path / "multigrid.toml").write_text(SCENES["multigrid"], encoding="utf-8")
+    (tmp_path / "program.py").write_text(FORCING, encoding="utf-8")
+    done = started(2, tmp_path / "program.py", tmp_path / "multigrid.toml", tmp_path / "out", tmp_path)
+    assert done.returncode == 0, done.stderr
+    one, other = (np.loadtxt(tmp_path / f"handed{rank}") for rank in range(2))
+    np.testing.assert_array_equal(one, other)
+    size, handed, reached = one[one[:, 3] > 0.0, :3].T
+    expected = [forcing(*pair) for pair in zip(size, [0.0, *size[:-1]], strict=True)]
+    np.testing.assert_allclose(handed, 0.5 * np.array(expected))
+    again = np.flatnonzero(one[:, 3] == 0.0)  # other right-hand sides with the same matrix
+    np.testing.assert_array_equal(one[again, 1], one[again - 1, 1])
+    assert (reached <= handed).all()
+    fast = size[1:] < 0.04 * size[:-1]
+    assert (handed[1:][fast] < 0.5 * MOST).all()
+    assert (handed[1:][fast] < handed[:-1][fast]).sum() > 1, "in Newton's iterations of two increments at least"
+    assert ((handed >= 0.5 * LEAST) & (handed <= 0.5 * MOST)).all()
+
+
+FORCING = """
+import sys
+from pathlib import Path
+import numpy as np
+from mpi4py import MPI
+from fabfem.cli import main
+from fabfem.parallel.solver import PetscSolver
+
+tried, factor, found, new = PetscSolver._tried, PetscSolver.factor, [], [True]
+def watched(self, ksp, b, size):
+    x, residual = tried(self, ksp, b, size)
+    found.append((size, ksp.getTolerances()[0], residual, new[0]))
+    new[0] = False
+    return x, residual
+def factored(self, matrix):
+    new[0] = True
+    factor(self, matrix)
+PetscSolver._tried, PetscSolver.factor = watched, factored
+status = main(["solve", sys.argv[1], "--out", sys.argv[2], "--quiet"])
+np.savetxt(Path(sys.argv[3]) / f"handed{MPI.COMM_WORLD.rank}", found)
+sys.exit(status)
+"""
+"""Writes down, solve by solve: norm of the right-hand side, tolerance handed to PETSc, residual, whether first."""
+
+
+@needs_mpi
+def test_several_ranks_find_the_condition_of_the_whole_matrix(shared: Path, tmp_path: Path) -> None:
+    """From solves with MUMPS's factors and their transposes; the growth of its pivots MUMPS does not tell."""
+    assert ran(tmp_path, 0, ["ill"]).returncode == 0
+    (header, _, one), (other, _, two) = table(tmp_path / "ill"), table(shared / "ill")
+    assert header[-2:] == ["condition_number [-]", "pivot_growth [-]"]
+    assert other == header[:-1]
+    assert one[:, -2].max() > 2.0 * one[0, -2], "clay that yields resists less"
+    np.testing.assert_allclose(two[:, -1], one[:, -2], rtol=1e-6)
+
+
+@needs_mpi
 def test_options_of_petsc_go_before_the_program_s_and_mumps_stands_in(alone: Path, shared: Path) -> None:
     ranks = json.loads((shared / "options" / "report.json").read_text(encoding="utf-8"))["ranks"]
     assert ranks["direct_instead"][0] == ranks["solves"][0] > 2  # one iteration, as the case says, is never enough
     assert max(apart(alone / "solid", shared / "options").values()) < 1e-8
+
+
+@needs_mpi
+def test_progress_and_summary_come_from_the_first_rank_alone(tmp_path: Path) -> None:
+    """What each rank says goes into files of its own; on a terminal, as `FORCE_COLOR` feigns, there is a bar."""
+    (tmp_path / "dry.toml").write_text(SCENES["dry"], encoding="utf-8")
+    (tmp_path / "program.py").write_text(SPOKEN, encoding="utf-8")
+    done = started(2, tmp_path / "program.py", tmp_path / "dry.toml", tmp_path / "out", tmp_path)
+    assert done.returncode == 0, done.stderr
+    first, shown, second, silent = ((tmp_path / name).read_text("utf-8") for name in ("1.0", "2.0", "1.1", "2.1"))
+    assert first.count("completed after 6 increments") == 1
+    assert "increment 6" in shown
+    assert second == silent == ""
+
+
+SPOKEN = """
+import os, sys
+os.environ["FORCE_COLOR"] = "1"
+from mpi4py import MPI
+for stream in (1, 2):
+    name = os.path.join(sys.argv[3], f"{stream}.{MPI.COMM_WORLD.rank}")
+    os.dup2(os.open(name, os.O_CREAT | os.O_WRONLY), stream)
+from fabfem.cli import main
+sys.exit(main(["solve", sys.argv[1], "--out", sys.argv[2]]))
+"""
+"""The command, its output by stream and rank."""
 
 
 @needs_mpi
@@ -231,7 +360,6 @@ def test_a_rank_that_fails_stops_all_with_its_reason(tmp_path: Path) -> None:
     [
         ('boundary = "top"', 'boundary = "topp"', "the mesh has no boundary 'topp'"),
         ("k0 = 0.6", "k0 = 0.6\n[solver]\nlinear = 'superlu'", "is a solver of one process"),
-        ("k0 = 0.6", "k0 = 0.6\n[solver]\ndiagnose = true", "by one process with the whole mesh"),
         ('fix = ["x", "y"]', 'fix = ["x"]', "one rigid motion"),
     ],
 )
@@ -242,6 +370,16 @@ def test_bad_input_is_said_once(wrong: str, right: str, said: str, tmp_path: Pat
     (line,) = [line for line in done.stderr.splitlines() if line.startswith("fabfem:")]
     assert "bad.toml" in line
     assert said in line
+
+
+@pytest.mark.parametrize(
+    ("size", "last", "wanted"),
+    [(1.0, 0.0, MOST), (5.0, 1.0, MOST), (0.03, 1.0, 4.5e-4), (2e-3, 1.0, 2e-6), (1e-9, 1.0, LEAST), (0.0, 1.0, LEAST)],
+)
+def test_the_forcing_term_is_the_square_of_what_was_left_within_bounds(size: float, last: float, wanted: float) -> None:
+    assert (LEAST, MOST) == (1e-8, 1e-3)
+    for scale in (1.0, 1e6):
+        assert forcing(scale * size, scale * last) == pytest.approx(wanted)
 
 
 @pytest.mark.skipif(not MISSING, reason="what it needs is installed")

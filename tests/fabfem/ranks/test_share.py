@@ -1,5 +1,7 @@
 """What needs no MPI of a shared run: owners of facets, values dealt out anew, pieces of fields that make one."""
 
+import re
+import tomllib
 from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
@@ -110,3 +112,13 @@ def test_pieces_of_fields_make_one(tmp_path: Path) -> None:
     assert whole.n_cells == 12
     np.testing.assert_allclose(whole["x"], whole.points[:, 0], rtol=1e-6)
     np.testing.assert_allclose(whole["stress"][:, 2], 2.0 * np.arange(12), rtol=1e-6)
+
+
+def test_no_scene_with_a_mesh_is_forgotten_in_the_comparison() -> None:
+    """Each has a row in docs/parallel.md; ``python tests/benchmarks/ranks.py --write 'the same answer'`` makes it."""
+    home = Path(__file__).parents[3]
+    cases = {f"{path.parent.name}/{path.stem}": path.read_text("utf-8") for path in (home / "cases").glob("*/*.toml")}
+    meshed = {name for name, text in cases.items() if tomllib.loads(text)["scene"]["kind"] == "boundary_value"}
+    page = (home / "docs" / "parallel.md").read_text("utf-8")
+    part = page.partition("<!-- the same answer -->")[2].partition("<!-- end -->")[0]
+    assert set(re.findall(r"^\| `([\w/]+)` \|", part, re.MULTILINE)) == meshed
