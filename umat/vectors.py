@@ -51,7 +51,7 @@ def _spread(builder: Any, kind: Any, value: Any) -> Any:
 
 def _place(context: Any, builder: Any, array: Any, kind: Any, index: Any) -> Any:
     """Return the address of a row."""
-    data = context.make_array(kind)(context, builder, array).data
+    data = context.data_model_manager[kind].get(builder, array, "data")
     first = builder.mul(index, index.type(WIDTH))
     return builder.bitcast(builder.gep(data, [first]), NUMBERS.as_pointer())
 

@@ -116,6 +116,30 @@ def table(material: Any, rule: Directions, cases: Cases, response: Any) -> None:
         print("pressure of the refused / p_ref, quartiles:", np.percentile(pressure, [0, 25, 50, 75, 100]))
 
 
+def limits(material: Any, rule: Directions, cases: Cases, response: Any) -> None:
+    """Print how near the points refused with `FABRIC_LIMIT` come to the end of the contact density E(n) = 1 + F:nn.
+
+    The greatest part of the increment that is answered is found by bisection, and the least E(n) of the rule there.
+    """
+    at = response.status == status.FABRIC_LIMIT
+    if not at.any():
+        return
+    old, increment = type(cases.state)(*(array[at] for array in cases.state)), cases.increment[at]
+    answered, refused = np.zeros(len(increment)), np.ones(len(increment))
+    for _ in range(30):
+        part = 0.5 * (answered + refused)
+        fine = umat.update(material, rule, increment * part[:, None], old).status == status.OK
+        answered, refused = np.where(fine, part, answered), np.where(fine, refused, part)
+    end = umat.update(material, rule, increment * answered[:, None], old).state
+
+    def least(fabric: np.ndarray) -> np.ndarray:
+        return 1.0 + np.einsum("ai,pij,aj->pa", rule.normals, mandel.to_tensor(fabric), rule.normals).min(axis=1)
+
+    for name, values in (("part answered", answered), ("least E(n) before", least(old.fabric)),
+                         ("and there", least(end.fabric))):  # fmt: skip
+        print(f"FABRIC_LIMIT, {name}: median {np.median(values):.2g}, most {values.max():.2g}")
+
+
 def run(law: str, localisation: str, units: str, cases: int, seed: int, rule: Directions) -> None:
     """Run and print one table."""
     material = toyoura(*UNITS[units])._replace(law=LAWS[law](), localisation=localisation)
@@ -127,6 +151,7 @@ def run(law: str, localisation: str, units: str, cases: int, seed: int, rule: Di
     print(f"\n{law}, {localisation}, {units}, {rule.name}: {cases} cases, {seconds:.1f} s, "
           f"{'no' if finite else 'SOME'} number that is not finite")  # fmt: skip
     table(material, rule, chosen, response)
+    limits(material, rule, chosen, response)
 
 
 def main() -> None:
