@@ -75,12 +75,15 @@ DIRECTION = np.array([0.5, -0.3, 0.4, 0.3, -0.5, 0.4])
 DIRECTION /= np.linalg.norm(DIRECTION)
 
 
-def taylor_orders(regimes: Regimes) -> np.ndarray:
-    """Return the order of the remainder σ(Δε + h d) − σ(Δε) − h D d in h, a slope over five halvings, of each point."""
+def taylor_orders(regimes: Regimes, span: float = 2e-3) -> np.ndarray:
+    """Return the order of the remainder σ(Δε + h d) − σ(Δε) − h D d in h, a slope over five halvings, of each point.
+
+    The largest h is the part `span` of the increment.
+    """
     base, n = regimes.updated(), len(regimes.names)
     ratio = 2.0 ** -np.arange(5)
     # well above the residual, 1e-5 of the increment at most, at which the tangent is taken
-    sizes = np.outer(np.maximum(regimes.largest, 2e-3) * mandel.norm(regimes.increment), ratio)
+    sizes = np.outer(np.maximum(regimes.largest, span) * mandel.norm(regimes.increment), ratio)
     trial = regimes.increment[:, None] + sizes[..., None] * DIRECTION
     response = umat.update(regimes.material, regimes.directions, trial.reshape(-1, 6), regimes.repeated(len(ratio)))
     assert not response.status.any()
