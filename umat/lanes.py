@@ -15,12 +15,26 @@ import numba
 import numpy as np
 from numba import njit
 
-from .compiling import InnerCompiler
 from .vectors import WIDTH
 
 COMPILED = not numba.config.DISABLE_JIT
 #: Points in flight in one kernel.
 LANES = WIDTH if COMPILED else 64
+
+#: Versions of numba, from one to before another, whose inside `compiling` is known to fit; others compile by themselves
+#: what they are given, in twice the time.
+KNOWN = (0, 61), (0, 69)
+
+
+def _pipeline() -> dict[str, Any]:
+    """Return the option that lets inner kernels be compiled by passes of their own, where numba is known."""
+    version = tuple(int(number) for number in numba.__version__.split(".")[:2])
+    if not KNOWN[0] <= version < KNOWN[1]:
+        return {}
+    from .compiling import InnerCompiler
+
+    return {"pipeline_class": InnerCompiler}
+
 
 # no kernel makes arrays, and counting who holds one would empty the vector registers at every turn
 _OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "fastmath": {"contract"}, "_nrt": False}
@@ -31,7 +45,7 @@ entry = njit(cache=True, **_OPTIONS)
 _INNER: dict[str, Any] = {
     "no_cpython_wrapper": True,
     "no_cfunc_wrapper": True,
-    "pipeline_class": InnerCompiler,
+    **_pipeline(),
     **_OPTIONS,
 }
 kernel = njit(**_INNER)

@@ -1,6 +1,8 @@
 """Kernels within kernels are compiled by passes of their own and compute what they do compiled by numba alone."""
 
 import gc
+import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -88,3 +90,15 @@ def test_garbage_is_collected_after_compiling():
     with pytest.raises(Exception, match="nothing"):
         lanes.kernel(lambda a: a.nothing).compile("float64(float64)")
     assert gc.isenabled()
+
+
+def test_a_numba_that_is_not_known_compiles_by_itself():
+    code = (
+        "import numba; numba.__version__ = '9.9.0'\n"
+        "import sys; from umat import lanes\n"
+        "assert 'umat.compiling' not in sys.modules\n"
+        "inner = lanes.inlined(lambda x: x * x)\n"
+        "print(numba.njit(lambda x: inner(x) + 1.0)(3.0))\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert done.stdout == "10.0\n", done.stderr
