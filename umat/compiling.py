@@ -24,19 +24,12 @@ from numba.core.typed_passes import NativeLowering, NopythonTypeInference
 
 from .lookups import InnerInference, InnerLower
 
-try:
-    from llvmlite.binding import newpassmanagers
-except ImportError:  # before llvmlite 0.44
-    newpassmanagers: Any = None  # type: ignore[no-redef]
-
 #: passes by their names, which not every version of numba has
 SPARED = {
     "AnnotateTypes", "DumpParforDiagnostics", "FindLiterallyCalls", "InlineClosureLikes", "InlineInlinables",
     "InlineOverloads", "LiteralPropagationSubPipelinePass", "LiteralUnroll", "MakeFunctionToJitFunction",
     "NoPythonSupportedFeatureValidation", "NopythonRewrites", "RewriteDynamicRaises", "WithLifting",
 }  # fmt: skip
-#: whether this version of llvmlite can simplify a function by chosen passes; it only saves time
-_SIMPLIFIES = hasattr(getattr(newpassmanagers, "FunctionPassManager", None), "add_sroa_pass")
 
 
 class InnerLibrary(JITCodeLibrary):
@@ -45,17 +38,7 @@ class InnerLibrary(JITCodeLibrary):
     _shared_module: Any
 
     def _optimize_functions(self, ll_module: Any) -> None:
-        """Put variables into registers and combine instructions, once for all copies; leave the rest to the entry."""
-        if not _SIMPLIFIES:
-            return
-        ll_module.data_layout = self._codegen._data_layout
-        tuning = newpassmanagers.create_pipeline_tuning_options()
-        builder = newpassmanagers.create_pass_builder(self._codegen._tm, tuning)
-        passes = newpassmanagers.create_new_function_pass_manager()
-        passes.add_sroa_pass()
-        passes.add_instruction_combine_pass()
-        for function in ll_module.functions:
-            passes.run(function, builder)
+        """Leave it to the entry."""
 
     def finalize(self) -> None:
         """Link nothing and make no machine code."""
