@@ -206,7 +206,7 @@ def test_options_of_petsc_go_before_the_program_s_and_mumps_stands_in(alone: Pat
 
 @needs_mpi
 def test_progress_and_summary_come_from_the_first_rank_alone(tmp_path: Path) -> None:
-    """What each rank says goes into files of its own; on a terminal, as `FORCE_COLOR` feigns, there is a bar."""
+    """What each rank says goes into files of its own, which pass for terminals, so that there is a bar."""
     (tmp_path / "dry.toml").write_text(SCENES["dry"], encoding="utf-8")
     (tmp_path / "program.py").write_text(SPOKEN, encoding="utf-8")
     done = started(2, tmp_path / "program.py", tmp_path / "dry.toml", tmp_path / "out", tmp_path)
@@ -220,6 +220,7 @@ def test_progress_and_summary_come_from_the_first_rank_alone(tmp_path: Path) -> 
 SPOKEN = """
 import os, sys
 os.environ["FORCE_COLOR"] = "1"
+sys.stderr.isatty = lambda: True
 from mpi4py import MPI
 for stream in (1, 2):
     name = os.path.join(sys.argv[3], f"{stream}.{MPI.COMM_WORLD.rank}")
