@@ -5,7 +5,6 @@ pilot computes and leaves after some seconds (`fabfem.rates`).
 """
 
 import time
-from itertools import islice
 from typing import Any, NamedTuple
 
 from fabfem import rates as kept
@@ -68,13 +67,18 @@ def stored(case: FabricCase) -> Rates | None:
 
 
 def _pilot(measured: Measured) -> Rates:
-    """Return the rates of the first blocks; what the first takes longer than the mean of all may be its kernels."""
-    start, watch, laps = time.process_time(), Stopwatch(), [0.0]
-    for _ in islice(measured.blocks, measured.size):
-        laps.append(watch.free)
-        if laps[-1] > PILOT:
+    """Return the rates of the first blocks; one that compiled kernels does not count where there are others."""
+    start, watch, blocks, laps = time.process_time(), Stopwatch(), iter(measured.blocks), [0.0]
+    next(blocks, None)
+    first, compiled = watch.free, watch.compiled
+    for _ in blocks:
+        laps.append(watch.free - first)
+        if watch.free > PILOT:
             break
-    return Rates(laps[-1] / max(len(laps) - 1, 1), start, False)
+    others = len(laps) - 1
+    if compiled and others:
+        return Rates(laps[-1] / others, start, False)
+    return Rates((first + laps[-1]) / (others + 1), start, False)
 
 
 def _kind(case: FabricCase) -> dict[str, Any]:
