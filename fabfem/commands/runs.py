@@ -41,9 +41,10 @@ def add_commands(commands: argparse._SubParsersAction, common: argparse.Argument
 def _solve(options: argparse.Namespace) -> int:
     from fabfem.case import read_case
     from fabfem.restart import Restart
+    from fabfem.rates import Stopwatch
     from fabfem.run import remember_cost, run_case
 
-    case = read_case(options.case)
+    case, watch = read_case(options.case), Stopwatch()
     if case.scene.kind != "boundary_value" and not first():
         return DONE  # what has no mesh is done by one process
     folder, restart = options.out or Path("results") / options.case.stem, Restart(options.resume, options.branch)
@@ -51,7 +52,7 @@ def _solve(options: argparse.Namespace) -> int:
     if first() and not options.quiet:
         print(outcome.summary(_error_class(case)))
     if outcome.status == "completed":
-        if not launched():
+        if not launched() and not watch.compiled:  # what only the first run of all costs is no price
             remember_cost(case, outcome.folder)
         return DONE
     return fail(outcome.reason, INTERRUPTED if outcome.status == "interrupted" else STOPPED)

@@ -74,6 +74,16 @@ def test_rates_are_measured_at_first_use_and_bettered_by_a_run(
     assert "judged by a run of this kind" in capsys.readouterr().out
 
 
+def test_a_run_that_compiled_kernels_leaves_no_rates(
+    case: BoundaryValueCase, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr("fabfem.rates._kernels", iter(range(10**6)).__next__)  # more at every look
+    assert main(["solve", str(case.path), "--out", str(case.path.parent / "out"), "--quiet"]) == DONE
+    assert stored(case) is None
+    assert main(["check", str(case.path)]) == DONE
+    assert "not known before" in capsys.readouterr().out
+
+
 def test_a_cache_that_cannot_be_written_or_read_is_no_trouble(case: BoundaryValueCase, folder: Path) -> None:
     (folder / "cache").write_text("", encoding="utf-8")
     remember(build(case), {"wall_time": {"linear_solve": 1.0, "total": 2.0}, "increments": [{"iterations": 1}]})
