@@ -54,14 +54,12 @@ class Price(NamedTuple):
     """Where the rates come from."""
 
 
-def price(problem: Problem, pilot: bool = True) -> Price | None:
-    """Return what a problem will cost; without rates of its kind a pilot may measure them, in ten seconds or so."""
+def price(problem: Problem) -> Price:
+    """Return what a problem will cost; without rates of its kind a pilot measures them, in ten seconds or so."""
     rates = stored(problem.case)
-    if rates is None and pilot:
+    if rates is None:
         rates = _pilot(problem)
         _store(problem.case, rates)
-    if rates is None:
-        return None
     source = "a run of this kind on this machine" if rates.whole else "its first increments on this machine"
     return Price(predicted(problem, rates), source)
 

@@ -11,6 +11,7 @@ from fabfem.boundary_value.meshes import hash_of
 from fabfem.boundary_value.omitted import memory, remaining
 from fabfem.boundary_value.price import price as price_of
 from fabfem.boundary_value.price import remember as remember_run
+from fabfem.boundary_value.price import stored
 from fabfem.boundary_value.problem import Problem, build
 from fabfem.boundary_value.record import PHASES, Recorder, Written, place_of, recall
 from fabfem.boundary_value.safety import sentence
@@ -45,8 +46,10 @@ def describe(case: BoundaryValueCase) -> Description:
 
 def price(case: BoundaryValueCase, pilot: bool) -> str:
     """Return what a run of a case will cost, in a sentence; nothing where that is not known without a pilot."""
-    cost = price_of(build(case), pilot)
-    return f"about {duration(cost.seconds)}, judged by {cost.source}" if cost else ""
+    if not pilot and stored(case) is None:
+        return ""
+    cost = price_of(build(case))
+    return f"about {duration(cost.seconds)}, judged by {cost.source}"
 
 
 def remember(case: BoundaryValueCase, folder: Path) -> None:

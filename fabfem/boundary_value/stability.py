@@ -41,10 +41,8 @@ def second_order_work(space: Space, increment: Increment) -> Array:
 def acoustic_determinant(space: Space, increment: Increment) -> Array:
     """Return the least determinant (npoints,) of the acoustic tensor over that of the elastic tangent [-]."""
     normals = _directions(space.mesh.dim)
-    ratio, tangent = (
-        np.ones(space.npoints),
-        tangents(space, increment.zones, space.strain(increment.step), increment.before),
-    )
+    ratio = np.ones(space.npoints)
+    tangent = tangents(space, increment.zones, space.strain(increment.step), increment.before)
     for name, zone in increment.zones.items():
         elastic = umat.elastic_tangent(zone.material, increment.states[name])
         ratio[zone.points] = _least(tangent[zone.points], elastic, normals)

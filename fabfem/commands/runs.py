@@ -40,8 +40,8 @@ def add_commands(commands: argparse._SubParsersAction, common: argparse.Argument
 
 def _solve(options: argparse.Namespace) -> int:
     from fabfem.case import read_case
-    from fabfem.restart import Restart
     from fabfem.rates import Stopwatch
+    from fabfem.restart import Restart
     from fabfem.run import remember_cost, run_case
 
     case, watch = read_case(options.case), Stopwatch()
@@ -73,12 +73,14 @@ def _check(options: argparse.Namespace) -> int:
     from fabfem.run import describe_case, price_case
 
     case = read_case(options.case)
+    told = first() and not options.quiet
+    # before the description, for a pilot counts the start of the program; of the whole scene, so by one process alone
+    cost = price_case(case, options.price) if told and not launched() else ""
     description = describe_case(case)
-    if first() and not options.quiet:
+    if told:
         print(resolved(case))
         print("# What the scene leaves out:", *description.omitted, sep="\n#   ")
-        cost = price_case(case, options.price) or UNKNOWN
-        print("# What remains:\n" + summary((*description.remains, ("time", cost)), prefix="#   "))
+        print("# What remains:\n" + summary((*description.remains, ("time", cost or UNKNOWN)), prefix="#   "))
     return DONE
 
 

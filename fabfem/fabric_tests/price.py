@@ -1,10 +1,11 @@
-"""What a case on fabric laws will cost, before it runs: its blocks times the time of one.
+"""What a case on fabric laws will cost, before it runs.
 
-The time is that of a run of the same laws under the same drive that completed, else of the first blocks, which a
-pilot computes and leaves after some seconds (`fabfem.rates`).
+It is what a run of the same laws under the same drive that completed has cost, else what the first blocks cost, which a
+pilot computes and leaves after some seconds, times their number (`fabfem.rates`).
 """
 
 import time
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 from fabfem import rates as kept
@@ -21,10 +22,8 @@ APART = {"title", "output", "picture"}
 class Rates(NamedTuple):
     """What a kind of run costs on this machine."""
 
-    block: float
-    """A block, computed and written [s]."""
-    start: float
-    """Program, packages, kernels, and the history that the laws are run along [s]."""
+    seconds: float
+    """Program, packages, kernels, the history that the laws are run along, and all blocks [s]."""
     whole: bool
     """Whether a whole run was measured, or a pilot."""
 
@@ -38,24 +37,21 @@ class Price(NamedTuple):
     """Where the rates come from."""
 
 
-def price(case: FabricCase, measured: Measured, pilot: bool) -> Price | None:
-    """Return what a run will cost; None where no rates of its kind are kept and no pilot may measure them."""
+def price(case: FabricCase, measure: Callable[[], Measured]) -> Price:
+    """Return what a run will cost; without rates of its kind a pilot measures the beginning of its table."""
     rates = stored(case)
-    if rates is None and pilot:
-        rates = _pilot(measured)
-        kept.store(_kind(case), rates._asdict())
     if rates is None:
-        return None
-    source = "a run of this kind on this machine" if rates.whole else "its first curves on this machine"
-    return Price(rates.start + rates.block * measured.size, source)
+        rates = _pilot(measure)
+        kept.store(_kind(case), rates._asdict())
+    return Price(
+        rates.seconds, "a run of this kind on this machine" if rates.whole else "its first curves on this machine"
+    )
 
 
 def remember(case: FabricCase, report: dict[str, Any]) -> None:
     """Store the rates of a run that completed, from its report."""
-    spent, free, count = report["wall_time"], share_of(report), max(len(report["curves"]), 1)
-    blocks = free * (spent["curves"] + spent["output"])
-    start = start_of(report) + free * spent["total"] - blocks
-    kept.store(_kind(case), Rates(blocks / count, start, True)._asdict())
+    seconds = start_of(report) + share_of(report) * report["wall_time"]["total"]
+    kept.store(_kind(case), Rates(seconds, True)._asdict())
 
 
 def stored(case: FabricCase) -> Rates | None:
@@ -66,19 +62,20 @@ def stored(case: FabricCase) -> Rates | None:
         return None
 
 
-def _pilot(measured: Measured) -> Rates:
+def _pilot(measure: Callable[[], Measured]) -> Rates:
     """Return the rates of the first blocks; one that compiled kernels does not count where there are others."""
-    start, watch, blocks, laps = time.process_time(), Stopwatch(), iter(measured.blocks), [0.0]
-    next(blocks, None)
-    first, compiled = watch.free, watch.compiled
-    for _ in blocks:
-        laps.append(watch.free - first)
-        if watch.free > PILOT:
+    start, loading = time.process_time(), Stopwatch()
+    measured = measure()
+    start += 0.0 if loading.compiled else loading.free
+    watch, count, each = Stopwatch(), 0, 0.0
+    for _ in measured.blocks:
+        count += 1
+        each = watch.free / count
+        if watch.compiled:
+            watch, count = Stopwatch(), 0
+        elif watch.free > PILOT:
             break
-    others = len(laps) - 1
-    if compiled and others:
-        return Rates(laps[-1] / others, start, False)
-    return Rates((first + laps[-1]) / (others + 1), start, False)
+    return Rates(start + measured.size * each, False)
 
 
 def _kind(case: FabricCase) -> dict[str, Any]:

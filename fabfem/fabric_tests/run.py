@@ -11,6 +11,7 @@ from fabfem.case import fabric as said
 from fabfem.fabric_tests.drives import Block, Measured, Value
 from fabfem.fabric_tests.price import price as price_of
 from fabfem.fabric_tests.price import remember as remember_run
+from fabfem.fabric_tests.price import stored
 from fabfem.outcome import Description, Outcome, claimed, short, unwritten
 from fabfem.output.history import History
 from fabfem.output.interrupt import held_back
@@ -64,8 +65,10 @@ def describe(case: FabricCase) -> Description:
 
 def price(case: FabricCase, pilot: bool) -> str:
     """Return what a run of a case will cost, in a sentence; nothing where that is not known without a pilot."""
-    cost = price_of(case, measure(case.drive, case), pilot)
-    return f"about {duration(cost.seconds)}, judged by {cost.source}" if cost else ""
+    if not pilot and stored(case) is None:
+        return ""
+    cost = price_of(case, lambda: measure(case.drive, case))
+    return f"about {duration(cost.seconds)}, judged by {cost.source}"
 
 
 def remember(case: FabricCase, folder: Path) -> None:

@@ -54,14 +54,12 @@ class Price(NamedTuple):
     """Where the rates come from."""
 
 
-def price(specimen: Specimen, pilot: bool = True) -> Price | None:
-    """Return what a test will cost; without rates of its kind a pilot may measure them, in two seconds or so."""
+def price(specimen: Specimen) -> Price:
+    """Return what a test will cost; without rates of its kind a pilot measures them, in two seconds or so."""
     rates = stored(specimen.case)
-    if rates is None and pilot:
+    if rates is None:
         rates = _pilot(specimen)
         kept.store(_kind(specimen.case), rates._asdict())
-    if rates is None:
-        return None
     source = "a run of this kind on this machine" if rates.whole else "its first rows on this machine"
     return predicted(specimen, rates)._replace(source=source)
 

@@ -13,6 +13,7 @@ from fabfem.failures import keep_stage
 from fabfem.identity import identity
 from fabfem.laboratory.price import price as price_of
 from fabfem.laboratory.price import remember as remember_run
+from fabfem.laboratory.price import stored
 from fabfem.laboratory.record import PHASES, STANDING, Reached, Recorder, Written
 from fabfem.laboratory.specimen import Specimen, build
 from fabfem.laboratory.stages import End, path
@@ -43,9 +44,9 @@ def describe(case: ElementCase) -> Description:
 
 def price(case: ElementCase, pilot: bool) -> str:
     """Return what a run of a case will cost, in a sentence; nothing where that is not known without a pilot."""
-    cost = price_of(build(case), pilot)
-    if cost is None:
+    if not pilot and stored(case) is None:
         return ""
+    cost = price_of(build(case))
     return f"about {duration(cost.seconds)}, {cost.evaluations:.2g} evaluations, judged by {cost.source}"
 
 

@@ -1,6 +1,8 @@
 """The price of a run before it runs."""
 
 import json
+import time
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -11,6 +13,7 @@ from fabfem.case import BoundaryValueCase, ElementCase, FabricCase, read_case
 from fabfem.cli import main
 from fabfem.commands.status import DONE
 from fabfem.fabric_tests import price as fabric
+from fabfem.fabric_tests.drives import Block, Measured
 from fabfem.fabric_tests.run import measure
 from fabfem.laboratory import price as element
 from fabfem.laboratory.specimen import Specimen
@@ -54,17 +57,15 @@ def test_a_finer_mesh_and_smaller_increments_cost_more(case: BoundaryValueCase) 
 def test_rates_are_measured_at_first_use_and_bettered_by_a_run(
     case: BoundaryValueCase, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert price(build(case), pilot=False) is None
+    assert stored(case) is None
     assert main(["check", str(case.path)]) == DONE
     assert "not known before a run of this kind" in capsys.readouterr().out
     first = price(build(case))
-    assert first is not None
     assert first.seconds > 0.0
     assert "first increments" in first.source
     folder = case.path.parent / "out"
     assert main(["solve", str(case.path), "--out", str(folder), "--quiet"]) == DONE
-    again = price(build(case), pilot=False)
-    assert again is not None
+    again = price(build(case))
     assert "a run of this kind" in again.source
     report = json.loads((folder / "report.json").read_text(encoding="utf-8"))
     took = report["processor_time"]
@@ -196,15 +197,34 @@ def test_a_case_on_fabric_laws_is_priced_by_its_curves(
     assert main(["solve", str(path), "--out", str(tmp_path / "out"), "--quiet"]) == DONE
     case = read_case(path)
     assert isinstance(case, FabricCase)
-    measured = measure(case.drive, case)
-    again = fabric.price(case, measured, pilot=False)
-    assert again is not None
+    known = fabric.stored(case)
+    assert known is not None
+    assert known.whole
     report = json.loads((tmp_path / "out" / "report.json").read_text(encoding="utf-8"))
     spent, took = report["wall_time"], report["processor_time"]
     assert sum(spent[phase] for phase in ("start", "curves", "output")) <= spent["total"]
-    assert again.seconds == pytest.approx(took["start"] + min(took["run"], spent["total"]), rel=0.01)
-    rates = fabric.stored(case)
-    assert rates is not None
-    more = fabric.price(case, measured._replace(size=20), pilot=False)
-    assert more is not None
-    assert more.seconds - again.seconds == pytest.approx(18 * rates.block)
+    assert known.seconds == pytest.approx(took["start"] + min(took["run"], spent["total"]), rel=0.01)
+
+
+def test_a_pilot_of_fabric_laws_takes_the_first_blocks_for_all(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    monkeypatch.setattr(fabric, "PILOT", 0.05)
+    path = tmp_path / "surface.toml"
+    path.write_text(FABRIC, encoding="utf-8")
+    case = read_case(path)
+    assert isinstance(case, FabricCase)
+    done = []
+
+    def blocks() -> Iterator[Block]:
+        for number in range(1000):
+            until = time.process_time() + 0.02
+            while time.process_time() < until:
+                pass
+            done.append(number)
+            yield Block([], {})
+
+    start = time.process_time()
+    found = fabric.price(case, lambda: Measured((), blocks(), 1000, ()))
+    assert len(done) < 20
+    assert 19.0 < found.seconds - start < 40.0
+    assert fabric.price(case, lambda: measure(case.drive, case)) == found
