@@ -75,12 +75,12 @@ def _check(options: argparse.Namespace) -> int:
     case = read_case(options.case)
     told = first() and not options.quiet
     # before the description, for a pilot counts the start of the program; of the whole scene, so by one process alone
-    cost = price_case(case, options.price) if told and not launched() else ""
+    time = [("time", price_case(case, options.price) or UNKNOWN)] if told and not launched() else []
     description = describe_case(case)
     if told:
         print(resolved(case))
         print("# What the scene leaves out:", *description.omitted, sep="\n#   ")
-        print("# What remains:\n" + summary((*description.remains, ("time", cost or UNKNOWN)), prefix="#   "))
+        print("# What remains:\n" + summary((*description.remains, *time), prefix="#   "))
     return DONE
 
 
