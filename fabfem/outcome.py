@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from enum import Enum
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -53,6 +54,20 @@ class Description(NamedTuple):
     """Name and size of what is left."""
     memory: float = 0.0
     """Memory that a run needs [MiB]; 0 where the scene cannot tell."""
+    time: str = ""
+    """What a run will cost in time, in words; empty where nobody asked, or it is not known without a pilot."""
+
+
+class Pricing(Enum):
+    """How much may be done to tell the time that a run will take."""
+
+    NONE = "nobody asked"
+    KNOWN = "say it where a run of the kind has been measured"
+    PILOT = "else measure the beginning of one"
+
+    def allows(self, known: bool) -> bool:
+        """Return whether a time may be told that is known from an earlier run, or not."""
+        return self is Pricing.PILOT or (self is Pricing.KNOWN and known)
 
 
 class FolderError(CaseError):

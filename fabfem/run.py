@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from fabfem.case import Case, read_case
-from fabfem.outcome import Description, Outcome
+from fabfem.outcome import Description, Outcome, Pricing
 from fabfem.restart import FRESH, Restart
 
 SCENES = {
@@ -15,7 +15,7 @@ SCENES = {
 }
 """Module that runs each kind of scene.
 
-It has `describe(case)`, `run(case, folder, quiet, timer, restart)`, `price(case, pilot)` and `remember(case, folder)`.
+It has `describe(case, pricing)`, `run(case, folder, quiet, timer, restart)` and `remember(case, folder)`.
 """
 
 
@@ -42,33 +42,23 @@ def run_case(source: Case | Path, folder: Path, quiet: bool = False, restart: Re
     return _scene(case).run(case, folder, quiet, restart=restart)
 
 
-def describe_case(case: Case) -> Description:
+def describe_case(case: Case, pricing: Pricing = Pricing.NONE) -> Description:
     """Return what a case leaves out and what remains, without running it.
-
-    Raises
-    ------
-    CaseError
-        If the case cannot be run.
-    """
-    return _scene(case).describe(case)
-
-
-def price_case(case: Case, pilot: bool) -> str:
-    """Return what a run of a case will cost in time, in words; nothing where no run of its kind has been measured.
 
     Parameters
     ----------
     case : Case
         What would be run.
-    pilot : bool
-        Measure the beginning of a run where none of its kind has been.
+    pricing : Pricing
+        Whether to say what time it will take, and whether to measure the beginning of a run for it. A pilot counts the
+        start of the program, so nothing else goes before.
 
     Raises
     ------
     CaseError
         If the case cannot be run.
     """
-    return str(_scene(case).price(case, pilot))
+    return _scene(case).describe(case, pricing)
 
 
 def remember_cost(case: Case, folder: Path) -> None:

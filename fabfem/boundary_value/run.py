@@ -9,9 +9,8 @@ from typing import Any
 from fabfem.boundary_value.audit import audited
 from fabfem.boundary_value.meshes import hash_of
 from fabfem.boundary_value.omitted import memory, remaining
-from fabfem.boundary_value.price import price as price_of
+from fabfem.boundary_value.price import price, stored
 from fabfem.boundary_value.price import remember as remember_run
-from fabfem.boundary_value.price import stored
 from fabfem.boundary_value.problem import Problem, build
 from fabfem.boundary_value.record import PHASES, Recorder, Written, place_of, recall
 from fabfem.boundary_value.safety import sentence
@@ -22,7 +21,7 @@ from fabfem.fem.increment import Collapsed, Increment, Stopped
 from fabfem.fem.solve import march
 from fabfem.fem.start import misfit
 from fabfem.identity import identity
-from fabfem.outcome import INTERRUPTED, Description, Outcome, claimed, short, unwritten
+from fabfem.outcome import INTERRUPTED, Description, Outcome, Pricing, claimed, short, unwritten
 from fabfem.output.checkpoints import Checkpoint
 from fabfem.output.interrupt import held_back, patient
 from fabfem.output.progress import Quiet
@@ -32,8 +31,8 @@ from fabfem.restart import FRESH, Restart, checkpoint_of
 from fabfem.timing import Timer
 
 
-def describe(case: BoundaryValueCase) -> Description:
-    """Return what a case leaves out and what remains, without running it.
+def describe(case: BoundaryValueCase, pricing: Pricing = Pricing.NONE) -> Description:
+    """Return what a case leaves out and what remains, without running it; see `fabfem.run.describe_case`.
 
     Raises
     ------
@@ -41,14 +40,14 @@ def describe(case: BoundaryValueCase) -> Description:
         If the case cannot be run.
     """
     problem = build(case)
-    return Description(problem.omitted, tuple(remaining(problem.model)), memory(problem.model))
+    return Description(problem.omitted, tuple(remaining(problem.model)), memory(problem.model), _time(problem, pricing))
 
 
-def price(case: BoundaryValueCase, pilot: bool) -> str:
-    """Return what a run of a case will cost, in a sentence; nothing where that is not known without a pilot."""
-    if not pilot and stored(case) is None:
+def _time(problem: Problem, pricing: Pricing) -> str:
+    """Return what a run will cost in time, in words, if that may be found out."""
+    if not pricing.allows(stored(problem.case) is not None):
         return ""
-    cost = price_of(build(case))
+    cost = price(problem)
     return f"about {duration(cost.seconds)}, judged by {cost.source}"
 
 

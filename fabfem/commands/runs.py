@@ -69,15 +69,17 @@ def _error_class(case: "Case") -> str:
 
 def _check(options: argparse.Namespace) -> int:
     from fabfem.case import read_case, resolved
+    from fabfem.outcome import Pricing
     from fabfem.output.progress import summary
-    from fabfem.run import describe_case, price_case
+    from fabfem.run import describe_case
 
     case = read_case(options.case)
     told = first() and not options.quiet
-    # before the description, for a pilot counts the start of the program; of the whole scene, so by one process alone
-    time = [("time", price_case(case, options.price) or UNKNOWN)] if told and not launched() else []
-    description = describe_case(case)
+    priced = told and not launched()  # a price is that of the whole scene in one process
+    measured = Pricing.PILOT if options.price else Pricing.KNOWN
+    description = describe_case(case, measured if priced else Pricing.NONE)
     if told:
+        time = [("time", description.time or UNKNOWN)] if priced else []
         print(resolved(case))
         print("# What the scene leaves out:", *description.omitted, sep="\n#   ")
         print("# What remains:\n" + summary((*description.remains, *time), prefix="#   "))

@@ -9,10 +9,9 @@ from typing import Any
 from fabfem.case import CaseError, FabricCase
 from fabfem.case import fabric as said
 from fabfem.fabric_tests.drives import Block, Measured, Value
-from fabfem.fabric_tests.price import price as price_of
+from fabfem.fabric_tests.price import price, stored
 from fabfem.fabric_tests.price import remember as remember_run
-from fabfem.fabric_tests.price import stored
-from fabfem.outcome import Description, Outcome, claimed, short, unwritten
+from fabfem.outcome import Description, Outcome, Pricing, claimed, short, unwritten
 from fabfem.output.history import History
 from fabfem.output.interrupt import held_back
 from fabfem.output.report import Report
@@ -58,16 +57,17 @@ def _(drive: said.Contacts, case: FabricCase) -> Measured:
     return contacts.measure(drive, case)
 
 
-def describe(case: FabricCase) -> Description:
-    """Return what a case leaves out and what remains; `CaseError` if it cannot be run."""
-    return Description(OMITTED, measure(case.drive, case).remains)
+def describe(case: FabricCase, pricing: Pricing = Pricing.NONE) -> Description:
+    """Return what a case leaves out and what remains; see `fabfem.run.describe_case`."""
+    time = _time(case, pricing)
+    return Description(OMITTED, measure(case.drive, case).remains, time=time)
 
 
-def price(case: FabricCase, pilot: bool) -> str:
-    """Return what a run of a case will cost, in a sentence; nothing where that is not known without a pilot."""
-    if not pilot and stored(case) is None:
+def _time(case: FabricCase, pricing: Pricing) -> str:
+    """Return what a run will cost in time, in words, if that may be found out."""
+    if not pricing.allows(stored(case) is not None):
         return ""
-    cost = price_of(case, lambda: measure(case.drive, case))
+    cost = price(case, lambda: measure(case.drive, case))
     return f"about {duration(cost.seconds)}, judged by {cost.source}"
 
 

@@ -11,13 +11,12 @@ from fabfem.case import CaseError, ElementCase
 from fabfem.case.paths import Path, Probe
 from fabfem.failures import keep_stage
 from fabfem.identity import identity
-from fabfem.laboratory.price import price as price_of
+from fabfem.laboratory.price import price, stored
 from fabfem.laboratory.price import remember as remember_run
-from fabfem.laboratory.price import stored
 from fabfem.laboratory.record import PHASES, STANDING, Reached, Recorder, Written
 from fabfem.laboratory.specimen import Specimen, build
 from fabfem.laboratory.stages import End, path
-from fabfem.outcome import INTERRUPTED, Description, Outcome, claimed, short, unwritten
+from fabfem.outcome import INTERRUPTED, Description, Outcome, Pricing, claimed, short, unwritten
 from fabfem.output.interrupt import held_back, patient
 from fabfem.output.progress import Quiet
 from fabfem.output.progress import shown as progress
@@ -30,8 +29,8 @@ PROGRAM = 185
 """Memory of the interpreter with the packages and compiled kernels that an element test loads [MiB]."""
 
 
-def describe(case: ElementCase) -> Description:
-    """Return what a case leaves out and what remains, without running it.
+def describe(case: ElementCase, pricing: Pricing = Pricing.NONE) -> Description:
+    """Return what a case leaves out and what remains, without running it; see `fabfem.run.describe_case`.
 
     Raises
     ------
@@ -39,14 +38,14 @@ def describe(case: ElementCase) -> Description:
         If the case cannot be run.
     """
     specimen = build(case)
-    return Description(specimen.omitted, tuple(_remaining(specimen)))
+    return Description(specimen.omitted, tuple(_remaining(specimen)), time=_time(specimen, pricing))
 
 
-def price(case: ElementCase, pilot: bool) -> str:
-    """Return what a run of a case will cost, in a sentence; nothing where that is not known without a pilot."""
-    if not pilot and stored(case) is None:
+def _time(specimen: Specimen, pricing: Pricing) -> str:
+    """Return what a run will cost in time, in words, if that may be found out."""
+    if not pricing.allows(stored(specimen.case) is not None):
         return ""
-    cost = price_of(build(case))
+    cost = price(specimen)
     return f"about {duration(cost.seconds)}, {cost.evaluations:.2g} evaluations, judged by {cost.source}"
 
 
