@@ -38,6 +38,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             if launched() and not options.shared:
                 return fail("several processes share 'solve' and 'check', no other command", BAD_INPUT)
             return options.command(options)
+        return DONE  # a process that others left nothing to do
     except KeyboardInterrupt:
         return fail("interrupted before the first increment", INTERRUPTED)
     except BrokenPipeError:  # whoever read the output, such as `head`, has seen enough

@@ -111,12 +111,14 @@ def _mesh(case: BoundaryValueCase) -> Mesh:
         return mesh_of(case)
     with _blamed(case, "solver.linear"):
         comm = communicator(case)
+    from fabfem.parallel.team import mustered
+
+    whole = mustered(lambda: mesh_of(case), lambda mesh: _mean_dilation(case, mesh), comm)
     from fabfem.parallel.partition import divided
     from fabfem.parallel.solver import Settings
 
-    settings = Settings(case.solver.linear == "multigrid", case.solver.petsc)
-    mesh = divided(lambda: mesh_of(case), hash_of, lambda mesh: _mean_dilation(case, mesh), comm, settings)
-    share_cores(comm, case.solver.threads)
+    mesh = divided(whole, hash_of, Settings(case.solver.linear == "multigrid", case.solver.petsc))
+    share_cores(whole.comm, case.solver.threads)
     return mesh
 
 

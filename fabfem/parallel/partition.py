@@ -5,73 +5,45 @@ The first rank reads the mesh and sends each rank its part, one after another; t
 
 from collections.abc import Callable, Iterator
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from fabfem.fem.mesh import Mesh, MeshError, owners
-from fabfem.fem.patches import patches
+from fabfem.fem.mesh import Mesh, owners
 from fabfem.parallel.rank import Part, Rank
 from fabfem.parallel.solver import Settings
+from fabfem.parallel.team import Whole
 
 
-def divided(
-    read: Callable[[], Mesh], told: Callable[[Mesh], str], together: Callable[[Mesh], bool], comm: MPI.Comm,
-    settings: Settings,
-) -> Mesh:  # fmt: skip
-    """Return this rank's part of the mesh that `read` returns.
+def divided(whole: Whole, told: Callable[[Mesh], str], settings: Settings) -> Mesh:
+    """Return this rank's part of a mesh.
 
     Parameters
     ----------
-    read : callable
-        Called by the first rank alone.
+    whole : Whole
     told : callable
         What a mesh is told apart by.
-    together : callable
-        Whether elements of one patch (`fabfem.fem.patches`) must stay on one rank.
-    comm : Comm
     settings : Settings
         What the linear solvers of the rank are made with.
-
-    Raises
-    ------
-    MeshError
-        On every rank, where there are more ranks than elements or the mesh cannot be read.
     """
-    whole = _on_first(read, comm)
-    part_of = _parts(whole, comm)
-    label = _on_first(lambda: _labels(whole, part_of, together(whole), comm.size), comm)
-    if whole is None:
+    comm = whole.comm
+    part_of = _parts(whole.mesh, comm)
+    if whole.mesh is None or whole.patch is None:
         mesh, part = comm.recv(source=0)
     else:
-        pieces = _pieces(whole, part_of, label, told(whole), comm.size)
+        _keep_together(part_of, whole.patch, comm.size)
+        pieces = _pieces(whole.mesh, part_of, whole.patch, told(whole.mesh), comm.size)
         mesh, part = next(pieces)
         for rank, piece in enumerate(pieces, 1):
             comm.send(piece, dest=rank)
     return replace(mesh, ranks=Rank(comm, part, settings))
 
 
-def _on_first(make: Callable[[], Any], comm: MPI.Comm) -> Any:
-    """Return what the first rank makes, there; None on the others. What it refuses, all refuse."""
-    made, trouble = None, None
-    if comm.rank == 0:
-        try:
-            made = make()
-        except ValueError as error:
-            trouble = error
-    if trouble := comm.bcast(trouble):
-        raise trouble
-    return made
-
-
 def _parts(mesh: Mesh | None, comm: MPI.Comm) -> np.ndarray:
     """Return the rank of each element, on the first rank; nothing on the others."""
     size = comm.bcast((mesh.dim, len(mesh.element.corners), len(mesh.cells)) if mesh else None)
     dim, ncorner, nel = size
-    if nel < comm.size:
-        raise MeshError(f"{comm.size} ranks cannot share {nel} elements.")
     if comm.size == 1:
         return np.zeros(nel, int)
     used, corners = np.unique(mesh.cells[:, :ncorner], return_inverse=True) if mesh else (np.zeros(0, int),) * 2
@@ -92,20 +64,16 @@ def _parts(mesh: Mesh | None, comm: MPI.Comm) -> np.ndarray:
     return part_of
 
 
-def _labels(mesh: Mesh, part_of: np.ndarray, together: bool, size: int) -> np.ndarray:
-    """Return the patch of each element, and let each patch follow its first element to one rank."""
-    label = patches(mesh) if together else np.arange(len(mesh.cells))
-    _, first = np.unique(label, return_index=True)
-    for proposed in (part_of, np.arange(len(label)) * size // len(label)):  # few elements: in their order
-        part_of[:] = proposed[first[label]]
+def _keep_together(part_of: np.ndarray, patch: np.ndarray, size: int) -> None:
+    """Let each patch follow its first element to one rank; where that leaves a rank without any, deal them in order."""
+    _, first, number = np.unique(patch, return_index=True, return_inverse=True)
+    for of_patch in (part_of[first], np.arange(len(first)) * size // len(first)):
+        part_of[:] = of_patch[number]
         if len(np.unique(part_of)) == size:
-            break
-    else:
-        raise MeshError(f"{size} ranks are too many for this mesh: one of them gets no element.")
-    return label
+            return
 
 
-def _pieces(mesh: Mesh, part_of: np.ndarray, label: np.ndarray, told: str, size: int) -> Iterator[tuple[Mesh, Part]]:
+def _pieces(mesh: Mesh, part_of: np.ndarray, patch: np.ndarray, told: str, size: int) -> Iterator[tuple[Mesh, Part]]:
     """Yield each rank's mesh and part."""
     owner = np.full(len(mesh.points), size)
     np.minimum.at(owner, mesh.cells, part_of[:, None])
@@ -124,7 +92,7 @@ def _pieces(mesh: Mesh, part_of: np.ndarray, label: np.ndarray, told: str, size:
             name: np.setdiff1d(local[np.unique(boundary)], np.append(sides[name], -1))
             for name, boundary in mesh.boundaries.items()
         }
-        known = np.unique(label[elements], return_inverse=True)[1]
+        known = np.unique(patch[elements], return_inverse=True)[1]
         part = Part(elements, nodes, int(mine.sum()), number[nodes[mine.sum() :]], known, touching, told)
         yield Mesh(mesh.points[nodes], local[mesh.cells[elements]], mesh.cell_type, zones, sides), part
 

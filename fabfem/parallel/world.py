@@ -18,6 +18,12 @@ ALONE, DISTRIBUTED = ("superlu", "pardiso"), ("mumps", "multigrid")
 MISSING = "it needs PETSc: 'pip install fabfem[mpi]' after what docs/parallel.md says about the system's packages"
 PATIENCE = 3.0
 """Time that a rank which fails waits for the others to fail too [s]."""
+_team: Any = None
+"""Communicator of the processes that have work, where that is not all."""
+
+
+class SpareError(Exception):
+    """Nothing is left to do for a process, since there are more of them than parts to share."""
 
 
 def launched() -> bool:
@@ -34,7 +40,7 @@ def shared(case: Any) -> bool:
 
 
 def communicator(case: Any) -> Any:
-    """Return the communicator of all processes, or of this one where no launcher started it.
+    """Return the communicator of all processes that have work, or of this one where no launcher started it.
 
     Raises
     ------
@@ -46,12 +52,17 @@ def communicator(case: Any) -> Any:
     for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS") if launched() else ():
         os.environ.setdefault(name, "1")  # a rank is a process for each core already
     try:
-        import petsc4py
+        import petsc4py  # noqa: F401
         from mpi4py import MPI
     except ImportError as error:
         raise ValueError(MISSING) from error
-    petsc4py.init(["fabfem"])
-    return MPI.COMM_WORLD if launched() else MPI.COMM_SELF
+    return (_team or MPI.COMM_WORLD) if launched() else MPI.COMM_SELF
+
+
+def keep_team(comm: Any) -> None:
+    """Keep the communicator of the processes that have work, for the others leave."""
+    global _team
+    _team = comm
 
 
 def first() -> bool:
@@ -79,9 +90,12 @@ def ended_together(traceback: bool = False) -> Iterator[None]:
 
     Where all fail alike, as on bad input, each goes on with its exception and the first tells it; where only some do,
     the others wait for them without end, so the failing rank says its reason and stops all. What was written stays.
+    A rank that has nothing to do leaves without a word.
     """
     try:
         yield
+    except SpareError:
+        return
     except BaseException as error:
         if launched() and _several():
             _stop_all(error, traceback)
@@ -110,7 +124,7 @@ def _stop_all(error: BaseException, traceback: bool) -> None:
 
 def _all_failed(world: Any) -> bool:
     """Return whether all ranks come here within some time."""
-    request, begun = world.Ibarrier(), monotonic()
+    request, begun = (_team or world).Ibarrier(), monotonic()
     while monotonic() - begun < PATIENCE:
         if request.Test():
             return True

@@ -373,6 +373,24 @@ def test_bad_input_is_said_once(wrong: str, right: str, said: str, tmp_path: Pat
     assert said in line
 
 
+@needs_mpi
+@pytest.mark.parametrize(("name", "cells"), [("dry", "2, 1"), ("patches", "1, 1")])
+def test_ranks_beyond_the_parts_of_a_mesh_have_nothing_to_do(name: str, cells: str, tmp_path: Path) -> None:
+    case = tmp_path / "few.toml"
+    case.write_text(re.sub(r"cells = \[[\d, ]+\]", f"cells = [{cells}]", SCENES[name]), encoding="utf-8")
+    for ranks in (0, 3):
+        done = started(ranks, "-m", "fabfem", "solve", case, "--out", tmp_path / str(ranks), "--quiet")
+        assert done.returncode == 0, done.stderr
+    assert max(apart(tmp_path / "0", tmp_path / "3").values()) < 1e-8
+    assert len(told(tmp_path / "3")["ranks"]["elements"]) < 3
+    bad = tmp_path / "bad.toml"
+    bad.write_text(case.read_text(encoding="utf-8").replace('boundary = "top"', 'boundary = "topp"'), encoding="utf-8")
+    done = started(3, "-m", "fabfem", "solve", bad, "--out", tmp_path / "out")
+    assert done.returncode == 2
+    (line,) = [line for line in done.stderr.splitlines() if line.startswith("fabfem:")]
+    assert "topp" in line
+
+
 @pytest.mark.parametrize(
     ("size", "last", "wanted"),
     [(1.0, 0.0, MOST), (5.0, 1.0, MOST), (0.03, 1.0, 4.5e-4), (2e-3, 1.0, 2e-6), (1e-9, 1.0, LEAST), (0.0, 1.0, LEAST)],
