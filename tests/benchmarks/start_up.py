@@ -21,7 +21,10 @@ PACKAGES = ["-c", "import numba, skfem, pydantic, meshio"]
 COMMANDS: dict[str, tuple[list[str], str]] = {
     "`python -c 'import numpy'`": (["-c", "import numpy"], ""),
     "`python -c 'import numba, skfem, pydantic, meshio'`": (PACKAGES, ""),
-    **{f"`fabfem check cases/{name}.toml`": (["-m", "fabfem", "check", name], "1") for name in (ELEMENT, CIRCULAR, STRIP)},
+    **{
+        f"`fabfem check cases/{name}.toml`": (["-m", "fabfem", "check", name], "1")
+        for name in (ELEMENT, CIRCULAR, STRIP)
+    },
     f"`fabfem solve cases/{ELEMENT}.toml`": (["-m", "fabfem", "solve", ELEMENT, "--out", "DIR"], "2"),
 }
 
