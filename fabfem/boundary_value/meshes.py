@@ -15,7 +15,9 @@ from fabfem.case import BoundaryValueCase
 from fabfem.case.mesh import Box
 from fabfem.fem.box import box_mesh
 from fabfem.fem.elements import ELEMENTS
-from fabfem.fem.mesh import Mesh, MeshError, read_mesh
+from fabfem.fem.facets import MeshError
+from fabfem.fem.mesh import Mesh
+from fabfem.fem.mesh_files import read_mesh
 from fabfem.identity import hashed
 from umat.cache import user_cache
 

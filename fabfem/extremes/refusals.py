@@ -9,7 +9,8 @@ import numpy as np
 
 from fabfem.case import CaseError
 from fabfem.fem.box import grid_mesh
-from fabfem.fem.mesh import Mesh, outer_facets
+from fabfem.fem.facets import outer_facets
+from fabfem.fem.mesh import Mesh
 from fabfem.verification.scene import Tables, held, solve, stage
 
 

@@ -7,7 +7,8 @@ import numpy as np
 
 from fabfem.extremes.sweep import Extreme, Found, sweep
 from fabfem.fem.box import grid_mesh
-from fabfem.fem.mesh import Mesh, outer_facets
+from fabfem.fem.facets import outer_facets
+from fabfem.fem.mesh import Mesh
 from fabfem.verification.bearing_capacity import heavy, soil, surcharge_factor
 from fabfem.verification.ground import Ground, footing
 from fabfem.verification.hill_tube import TUBE

@@ -6,7 +6,8 @@ from itertools import permutations
 import numpy as np
 
 from fabfem.fem.elements import ELEMENTS
-from fabfem.fem.mesh import Mesh, checked, outer_facets, quadratic
+from fabfem.fem.facets import outer_facets
+from fabfem.fem.mesh import Mesh, checked, quadratic
 
 SIDES = {2: (("left", "right"), ("bottom", "top")), 3: (("left", "right"), ("front", "back"), ("bottom", "top"))}
 """Names of the sides at the lower and upper end of each axis."""

@@ -11,7 +11,8 @@ No patch reaches across the border of a zone.
 import numpy as np
 
 from fabfem.fem.elements import ELEMENTS
-from fabfem.fem.mesh import Mesh, inner_facets
+from fabfem.fem.facets import inner_facets
+from fabfem.fem.mesh import Mesh
 
 ROUNDS = {2: 1, 3: 3}
 """How often neighbours are joined, by dimension."""

@@ -8,7 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fabfem.fem.box import grid_mesh
-from fabfem.fem.mesh import Mesh, outer_facets
+from fabfem.fem.facets import outer_facets
+from fabfem.fem.mesh import Mesh
 from fabfem.verification.scene import Answer, Tables, held, stage
 
 HALF = 0.5

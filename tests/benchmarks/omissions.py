@@ -21,10 +21,11 @@ from page import write_table
 
 import umat
 from fabfem.fem.box import grid_mesh
+from fabfem.fem.facets import outer_facets
 from fabfem.fem.increment import Increment
 from fabfem.fem.kinematics import KINEMATICS
 from fabfem.fem.loads import Pressure
-from fabfem.fem.mesh import Mesh, outer_facets, quadratic
+from fabfem.fem.mesh import Mesh, quadratic
 from fabfem.fem.model import Controls, Model, Zone
 from fabfem.fem.solve import march, reaction
 from fabfem.fem.space import build_space

@@ -22,9 +22,10 @@ import pytest
 
 import umat
 from fabfem.fem.box import box_mesh
+from fabfem.fem.facets import outer_facets
 from fabfem.fem.kinematics import KINEMATICS
 from fabfem.fem.loads import Load, Pressure
-from fabfem.fem.mesh import Mesh, outer_facets
+from fabfem.fem.mesh import Mesh
 from fabfem.fem.model import Controls, Model, Zone
 from fabfem.fem.solve import Increment, march, reaction
 from fabfem.fem.space import build_space

@@ -265,7 +265,8 @@ def mesh_files() -> list[Path]:
 @pytest.mark.parametrize("file", mesh_files(), ids=lambda file: file.name)
 def test_a_mesh_cut_short(file: Path, tmp_path: Path) -> None:
     """Wherever it is cut, within a line at the latest, it is refused, or it is the whole mesh."""
-    from fabfem.fem.mesh import MeshError, read_mesh
+    from fabfem.fem.facets import MeshError
+    from fabfem.fem.mesh_files import read_mesh
 
     whole, said = read_mesh(file), file.read_bytes()
     cut = tmp_path / file.name

@@ -9,7 +9,9 @@ import pytest
 
 from fabfem.fem.box import box_mesh
 from fabfem.fem.elements import ELEMENTS
-from fabfem.fem.mesh import MeshError, checked, from_meshio, quadratic, read_mesh
+from fabfem.fem.facets import MeshError
+from fabfem.fem.mesh import checked, quadratic
+from fabfem.fem.mesh_files import from_meshio, read_mesh
 
 SHIPPED = Path(__file__).parents[2] / "meshes"
 POINTS = np.array([[0, 0], [1, 0], [2, 0], [0, 1], [1, 1], [2, 1]], float)

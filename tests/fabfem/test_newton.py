@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 
 from fabfem.fem.box import box_mesh
+from fabfem.fem.facets import outer_facets
 from fabfem.fem.kinematics import KINEMATICS
 from fabfem.fem.loads import Pressure
-from fabfem.fem.mesh import Mesh, outer_facets
+from fabfem.fem.mesh import Mesh
 from fabfem.fem.model import Controls, Model, Refusal, Zone, update_points
 from fabfem.fem.solve import Increment, march
 from fabfem.fem.space import build_space

@@ -13,8 +13,9 @@ from scipy.sparse.linalg import spsolve
 from fabfem.fem.assembly import find_pattern, stiffness
 from fabfem.fem.box import SIDES, box_mesh
 from fabfem.fem.elements import ELEMENTS, quadrature, shape
+from fabfem.fem.facets import outer_facets
 from fabfem.fem.kinematics import KINEMATICS
-from fabfem.fem.mesh import Mesh, outer_facets, quadratic
+from fabfem.fem.mesh import Mesh, quadratic
 from fabfem.fem.model import Controls, Model, Zone
 from fabfem.fem.patches import patches
 from fabfem.fem.solve import Increment, march

@@ -8,9 +8,11 @@ import numpy as np
 import pytest
 
 from fabfem.fem.box import box_mesh
+from fabfem.fem.facets import outer_facets
 from fabfem.fem.kinematics import KINEMATICS
 from fabfem.fem.loads import Gravity, Load, Pressure, k0_stress
-from fabfem.fem.mesh import Mesh, outer_facets, read_mesh
+from fabfem.fem.mesh import Mesh
+from fabfem.fem.mesh_files import read_mesh
 from fabfem.fem.model import Controls, Model, Zone
 from fabfem.fem.solve import Increment, Stopped, march, reaction
 from fabfem.fem.space import Space, build_space

@@ -163,7 +163,7 @@ def test_every_command_is_completed(shell: str, capsys: pytest.CaptureFixture[st
 def test_a_mesh_of_gmsh_2_has_its_names(tmp_path: Path) -> None:
     main(["new", "slope", str(tmp_path), "--quiet"])
     subprocess.run([sys.executable, "slope_mesh.py", "slope.msh", "angle=30", "size=2.5"], cwd=tmp_path, check=True)
-    from fabfem.fem.mesh import read_mesh
+    from fabfem.fem.mesh_files import read_mesh
 
     mesh = read_mesh(tmp_path / "slope.msh")
     assert set(mesh.zones) == {"slope", "ground"}

@@ -9,7 +9,8 @@ import pytest
 
 from fabfem.fem.kinematics import KINEMATICS
 from fabfem.fem.loads import Pressure
-from fabfem.fem.mesh import Mesh, read_mesh
+from fabfem.fem.mesh import Mesh
+from fabfem.fem.mesh_files import read_mesh
 from fabfem.fem.model import Model, Zone
 from fabfem.fem.patches import patches
 from fabfem.fem.solve import Increment, march
