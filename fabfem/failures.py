@@ -14,7 +14,7 @@ from fabfem.output.archive import write_archive
 
 if TYPE_CHECKING:  # an element test imports nothing of the finite elements
     from fabfem.fem.increment import Cutback
-    from fabfem.fem.model import Refused
+    from fabfem.fem.points import Refused
 
 FOLDER, FILE = "replay", "failure.npz"
 KEPT = 5

@@ -12,10 +12,10 @@ import numpy as np
 import umat
 from fabfem.boundary_value.problem import Problem
 from fabfem.case.stages import Geostatic, Gravity
+from fabfem.fem.constraints import constrain
 from fabfem.fem.increment import Increment
-from fabfem.fem.model import stress_of
+from fabfem.fem.points import stress_of
 from fabfem.fem.space import Space
-from fabfem.fem.supports import constrain
 from umat.mandel import Array
 
 BALANCED = 1e-6

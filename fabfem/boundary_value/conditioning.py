@@ -13,7 +13,7 @@ from fabfem.fem.diagnosis import Condition, condition
 from fabfem.fem.increment import Increment
 from fabfem.fem.linear import whole
 from fabfem.fem.model import Model
-from fabfem.fem.solve import systems_of
+from fabfem.fem.systems import systems_of
 
 
 class Conditioning:

@@ -22,7 +22,8 @@ import numpy as np
 import umat
 from fabfem.boundary_value.probes import Column, Keeper, Value
 from fabfem.case import BoundaryValueCase, CaseError
-from fabfem.fem.model import Model, Zone, tangents
+from fabfem.fem.model import Model, Zone
+from fabfem.fem.points import tangents
 from fabfem.fem.recovery import energy_density, fine_space, nearest, recovered, stress_within
 from fabfem.fem.share import mapped
 from fabfem.fem.solve import Increment

@@ -23,15 +23,15 @@ from fabfem.boundary_value.program import Scene, program
 from fabfem.boundary_value.water import pore_water
 from fabfem.case import BoundaryValueCase, CaseError, boundaries_of, nearest, suggest, zones_named
 from fabfem.case.materials import ChangHicher
+from fabfem.fem.constraints import constrain
 from fabfem.fem.kinematics import KINEMATICS
 from fabfem.fem.loads import loading
 from fabfem.fem.mesh import Mesh
 from fabfem.fem.model import Controls, Model, Zone
-from fabfem.fem.pores import porous
-from fabfem.fem.solve import absent_dofs
+from fabfem.fem.porous_space import porous
 from fabfem.fem.space import Space, build_space
 from fabfem.fem.stages import Stage
-from fabfem.fem.supports import constrain
+from fabfem.fem.systems import absent_dofs
 from fabfem.parallel.world import communicator, share_cores, shared
 from fabfem.substance import MisfitError, Substance, Surroundings, substance
 

@@ -16,7 +16,7 @@ from fabfem.case.stages import AnyStage, Geostatic, Load, StrengthReduction
 from fabfem.case.stages import Gravity as Weight
 from fabfem.fem.loads import BodyForce, Gravity, Pressure, Traction
 from fabfem.fem.loads import Load as Acting
-from fabfem.fem.pores import PORE_PRESSURE
+from fabfem.fem.porous_space import PORE_PRESSURE
 from fabfem.fem.space import Space
 from fabfem.fem.stages import ArcLength, Change, DisplacementControl, Goal, Stage, StrengthSearch
 from fabfem.fem.supports import RigidBody, Support

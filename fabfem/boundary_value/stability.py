@@ -13,7 +13,7 @@ import numpy as np
 
 import umat
 from fabfem.fem.increment import Increment
-from fabfem.fem.model import tangents
+from fabfem.fem.points import tangents
 from fabfem.fem.space import Space
 from umat.mandel import COLUMN, FACTOR, ROW, Array
 

@@ -8,7 +8,8 @@ from fabfem.case import BoundaryValueCase
 from fabfem.case.materials import ChangHicher, Material
 from fabfem.fem.increment import Increment
 from fabfem.fem.model import Zone
-from fabfem.fem.pores import PoreWater, PorousSpace
+from fabfem.fem.pores import PoreWater
+from fabfem.fem.porous_space import PorousSpace
 from fabfem.fem.space import Space
 from umat.mandel import Array
 

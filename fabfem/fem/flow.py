@@ -18,8 +18,8 @@ from typing import NamedTuple
 import numpy as np
 
 from fabfem.fem.increment import advanced, largest
-from fabfem.fem.model import Refusal, elastic_tangents
 from fabfem.fem.newton import solve_increment, solved, stiffness_of
+from fabfem.fem.points import Refusal, elastic_tangents
 from fabfem.fem.trial import Equilibrium, System, Task, Trial, relative
 
 EQUILIBRIUM, COLLAPSE, UNDECIDED = "equilibrium", "collapse", "undecided"

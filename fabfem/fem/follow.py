@@ -25,8 +25,8 @@ import numpy as np
 from fabfem.fem.control import Control, control
 from fabfem.fem.increment import Cutback, Increment, Place, Step, Stopped, advanced, increment
 from fabfem.fem.loads import Loading
-from fabfem.fem.model import Refusal, elastic_tangents
 from fabfem.fem.newton import Solved, pushed, stiffness_of, worst_point
+from fabfem.fem.points import Refusal, elastic_tangents
 from fabfem.fem.trial import Equilibrium, System, Task, Trial, attempt
 
 EXACT = 1e-8

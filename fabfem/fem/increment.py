@@ -6,8 +6,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from fabfem.fem.model import Refused, States, Zone
+from fabfem.fem.model import States, Zone
 from fabfem.fem.newton import Solved
+from fabfem.fem.points import Refused
 from fabfem.fem.stages import Stage
 from fabfem.fem.start import Start
 from fabfem.fem.trial import Equilibrium, System, Trial, begun, relative, work
@@ -78,7 +79,7 @@ class Increment:
     before: States
     """States where the increment began."""
     tangent: np.ndarray
-    """(npoints, k, k) consistent tangent at its end between active components; `model.tangents` has all."""
+    """(npoints, k, k) consistent tangent at its end between active components; `points.tangents` has all."""
     resume: Start
     """Where a march can be taken up after it."""
     strength: float = 1.0

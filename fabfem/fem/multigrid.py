@@ -18,9 +18,9 @@ import numpy as np
 from scipy.sparse import csr_matrix, triu
 from scipy.sparse.linalg import LinearOperator, cg, gmres
 
+from fabfem.fem.constraints import Constraints
 from fabfem.fem.linear import LinearSolver, Solution, norm
 from fabfem.fem.space import Space
-from fabfem.fem.supports import Constraints
 
 MANY = 30_000
 """Unknowns of a solid from which it takes less time than a direct solver; `docs/performance.md`."""

@@ -15,7 +15,8 @@ from scipy.sparse import csr_matrix
 
 from fabfem.fem.diagnosis import singularity
 from fabfem.fem.linear import whole
-from fabfem.fem.model import Controls, Refusal, elastic_tangents
+from fabfem.fem.model import Controls
+from fabfem.fem.points import Refusal, elastic_tangents
 from fabfem.fem.trial import Equilibrium, System, Task, Trial, attempt, make_task, resisted, work
 
 MARGIN = 0.1

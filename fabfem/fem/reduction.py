@@ -11,8 +11,8 @@ import numpy as np
 from scipy.sparse import csr_matrix
 
 from fabfem.fem.assembly import Pattern, find_pattern, stiffness
+from fabfem.fem.constraints import Constraints
 from fabfem.fem.space import Space
-from fabfem.fem.supports import Constraints
 
 
 @dataclass(frozen=True)

@@ -17,8 +17,9 @@ import numpy as np
 from fabfem.fem.flow import EQUILIBRIUM, Flow, elastic_displacement, flow
 from fabfem.fem.increment import Collapsed, Cutback, Factor, Increment, Place, Step, advanced, increment, largest
 from fabfem.fem.loads import Loading
-from fabfem.fem.model import Refusal, weaken
+from fabfem.fem.model import weaken
 from fabfem.fem.newton import Solved, solve_increment
+from fabfem.fem.points import Refusal
 from fabfem.fem.stages import StrengthSearch
 from fabfem.fem.trial import Equilibrium, System, Trial
 

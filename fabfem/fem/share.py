@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from fabfem.fem.pores import PorousSpace
+from fabfem.fem.porous_space import PorousSpace
 from fabfem.fem.space import Space
 
 KINDS = {

@@ -10,12 +10,13 @@ from typing import NamedTuple
 import numpy as np
 from scipy.sparse import csr_matrix
 
+from fabfem.fem.constraints import Constraints
 from fabfem.fem.linear import LinearSolver
-from fabfem.fem.model import Batch, Controls, Refusal, States, Zone, elastic_tangents, update_points
+from fabfem.fem.model import Controls, States, Zone
+from fabfem.fem.points import Batch, Refusal, elastic_tangents, update_points
 from fabfem.fem.pores import Water
 from fabfem.fem.reduction import Reduction
 from fabfem.fem.space import Space
-from fabfem.fem.supports import Constraints
 from fabfem.timing import Timer
 
 PHASES = ("material", "assembly", "linear_solve")

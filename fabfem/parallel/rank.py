@@ -11,11 +11,11 @@ import numpy as np
 from mpi4py import MPI
 from petsc4py import PETSc
 
+from fabfem.fem.constraints import Constraints
 from fabfem.fem.mesh import Mesh
-from fabfem.fem.model import Refusal
+from fabfem.fem.points import Refusal
 from fabfem.fem.ranks import Alone, Around
 from fabfem.fem.space import Space
-from fabfem.fem.supports import Constraints
 from fabfem.parallel.halo import around
 from fabfem.parallel.solver import PetscSolver, Settings
 

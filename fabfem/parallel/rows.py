@@ -5,9 +5,9 @@ from mpi4py import MPI
 from petsc4py import PETSc
 from scipy.sparse import csr_matrix
 
-from fabfem.fem.pores import PorousSpace
+from fabfem.fem.constraints import Constraints
+from fabfem.fem.porous_space import PorousSpace
 from fabfem.fem.space import Space
-from fabfem.fem.supports import Constraints
 
 
 class Rows:

@@ -18,10 +18,10 @@ from mpi4py import MPI
 from petsc4py import PETSc
 from scipy.sparse import csr_matrix
 
+from fabfem.fem.constraints import Constraints
 from fabfem.fem.linear import OVERFLOW, POOR, REFINEMENTS, USELESS, Solution
-from fabfem.fem.pores import PorousSpace
+from fabfem.fem.porous_space import PorousSpace
 from fabfem.fem.space import Space
-from fabfem.fem.supports import Constraints
 from fabfem.parallel.condition import condition_number
 from fabfem.parallel.forcing import MOST, forcing
 from fabfem.parallel.rows import Rows

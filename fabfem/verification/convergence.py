@@ -13,13 +13,13 @@ from typing import NamedTuple
 import numpy as np
 
 from fabfem.fem.box import box_mesh
+from fabfem.fem.constraints import Constraints
 from fabfem.fem.elements import ELEMENTS
 from fabfem.fem.kinematics import KINEMATICS, Kinematics
 from fabfem.fem.linear import make_solver
 from fabfem.fem.mesh import Mesh, quadratic
 from fabfem.fem.reduction import Reduction
 from fabfem.fem.space import Space, build_space
-from fabfem.fem.supports import Constraints
 from fabfem.verification.row import Row
 from umat import Elastic, elastic_tangent, initial_state
 from umat.elastic import bulk_modulus, shear_modulus

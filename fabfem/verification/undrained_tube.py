@@ -8,7 +8,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from fabfem.fem.pores import PorousSpace
+from fabfem.fem.porous_space import PorousSpace
 from fabfem.verification.ring import ring, ring_mesh
 from fabfem.verification.row import Row
 from fabfem.verification.scene import Answer, Tables, solve

@@ -16,11 +16,12 @@ from timing import median_time
 
 from fabfem.fem.assembly import find_pattern, stiffness
 from fabfem.fem.box import box_mesh
+from fabfem.fem.constraints import constrain
 from fabfem.fem.kinematics import KINEMATICS
 from fabfem.fem.linear import make_solver, norm
 from fabfem.fem.reduction import Reduction
 from fabfem.fem.space import Space, build_space
-from fabfem.fem.supports import Support, constrain
+from fabfem.fem.supports import Support
 from umat import Elastic, elastic_tangent, initial_state
 
 

@@ -7,12 +7,13 @@ from scipy.sparse import csr_matrix
 
 from fabfem.fem.assembly import diagonal, find_pattern, stiffness
 from fabfem.fem.box import box_mesh
+from fabfem.fem.constraints import Constraints, constrain
 from fabfem.fem.kinematics import KINEMATICS
 from fabfem.fem.linear import whole as mirrored
 from fabfem.fem.loads import Gravity, Pressure, Traction, nodal_force
 from fabfem.fem.reduction import Reduction
 from fabfem.fem.space import Space, build_space
-from fabfem.fem.supports import Constraints, RigidBody, Support, constrain
+from fabfem.fem.supports import RigidBody, Support
 from umat.mandel import from_tensor
 
 FORMS = {

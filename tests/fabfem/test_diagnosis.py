@@ -17,10 +17,11 @@ from fabfem.fem.linear import whole
 from fabfem.fem.loads import Pressure, Traction
 from fabfem.fem.mesh import Mesh
 from fabfem.fem.model import Controls, Model, Zone
-from fabfem.fem.solve import Increment, Stopped, march, systems_of
+from fabfem.fem.solve import Increment, Stopped, march
 from fabfem.fem.space import build_space
 from fabfem.fem.stages import Stage
 from fabfem.fem.supports import Support
+from fabfem.fem.systems import systems_of
 from fabfem.verification.scene import solve
 from umat.mandel import IDENTITY
 

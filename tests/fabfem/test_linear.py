@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from scipy.sparse import csr_matrix, diags, random_array, triu
 
-from fabfem.fem.linear import DirectSolver, PardisoBackend, SuperLUBackend, make_solver
+from fabfem.fem.linear import DirectSolver, SuperLUBackend, make_solver
+from fabfem.fem.pardiso import PardisoBackend
 
 needs_pardiso = pytest.mark.skipif(find_spec("pypardiso") is None, reason="pypardiso is not installed")
 SOLVERS = {"superlu": lambda: DirectSolver(SuperLUBackend()), "pardiso": lambda: DirectSolver(PardisoBackend())}

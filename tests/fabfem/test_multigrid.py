@@ -10,6 +10,7 @@ from scipy.sparse import csr_matrix, diags
 from fabfem.fem import multigrid
 from fabfem.fem.assembly import find_pattern
 from fabfem.fem.box import box_mesh
+from fabfem.fem.constraints import constrain
 from fabfem.fem.kinematics import KINEMATICS
 from fabfem.fem.linear import make_solver
 from fabfem.fem.loads import Pressure
@@ -19,7 +20,7 @@ from fabfem.fem.reduction import Reduction
 from fabfem.fem.solve import march
 from fabfem.fem.space import Space, build_space
 from fabfem.fem.stages import Stage
-from fabfem.fem.supports import RigidBody, Support, constrain
+from fabfem.fem.supports import RigidBody, Support
 from umat import Elastic, MohrCoulomb, VonMises, elastic_tangent, initial_state
 
 pytestmark = pytest.mark.skipif(find_spec("pyamg") is None, reason="pyamg is not installed")

@@ -11,7 +11,8 @@ from fabfem.fem.facets import outer_facets
 from fabfem.fem.kinematics import KINEMATICS
 from fabfem.fem.loads import Pressure
 from fabfem.fem.mesh import Mesh
-from fabfem.fem.model import Controls, Model, Refusal, Zone, update_points
+from fabfem.fem.model import Controls, Model, Zone
+from fabfem.fem.points import Refusal, update_points
 from fabfem.fem.solve import Increment, march
 from fabfem.fem.space import build_space
 from fabfem.fem.stages import Stage
@@ -114,8 +115,8 @@ def test_points_asked_in_parts_answer_the_same(ids: bool, monkeypatch: pytest.Mo
     zones = {"all": zone._replace(points=np.arange(model.space.npoints)) if ids else zone}
     strain = 1e-3 * np.random.default_rng(0).normal(size=(model.space.npoints, 6))
     whole = update_points(model.space, zones, strain, model.states)
-    monkeypatch.setattr("fabfem.fem.model.MANY", 10)
-    monkeypatch.setattr("fabfem.fem.model.AT_ONCE", 7)
+    monkeypatch.setattr("fabfem.fem.points.MANY", 10)
+    monkeypatch.setattr("fabfem.fem.points.AT_ONCE", 7)
     parts = update_points(model.space, zones, strain, model.states)
     assert not isinstance(whole, Refusal)
     assert not isinstance(parts, Refusal)

@@ -11,7 +11,8 @@ from fabfem.fem.kinematics import KINEMATICS
 from fabfem.fem.loads import BodyForce, Load, Pressure
 from fabfem.fem.mesh import Mesh
 from fabfem.fem.model import Controls, Model, Zone
-from fabfem.fem.pores import PORE_PRESSURE, PoreWater, PorousSpace, porous
+from fabfem.fem.pores import PoreWater
+from fabfem.fem.porous_space import PORE_PRESSURE, PorousSpace, porous
 from fabfem.fem.solve import Increment, march
 from fabfem.fem.space import build_space
 from fabfem.fem.stages import Stage

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from fabfem.fem.box import box_mesh
+from fabfem.fem.constraints import constrain
 from fabfem.fem.facets import outer_facets
 from fabfem.fem.kinematics import KINEMATICS
 from fabfem.fem.loads import BodyForce, Gravity, Load, Pressure
@@ -15,7 +16,7 @@ from fabfem.fem.model import Controls, Model, Zone
 from fabfem.fem.solve import Increment, Stopped, march, reaction
 from fabfem.fem.space import Space, build_space
 from fabfem.fem.stages import Change, Stage
-from fabfem.fem.supports import RigidBody, Support, constrain
+from fabfem.fem.supports import RigidBody, Support
 from umat import Elastic, VonMises, initial_state
 
 YOUNG, POISSON, WEIGHT = 1e4, 0.25, 20.0

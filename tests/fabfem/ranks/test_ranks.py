@@ -271,8 +271,8 @@ from pathlib import Path
 import numpy as np
 from fabfem.boundary_value.problem import build
 from fabfem.case import case_from, read_tables
-from fabfem.fem.model import elastic_tangents
-from fabfem.fem.solve import systems_of
+from fabfem.fem.points import elastic_tangents
+from fabfem.fem.systems import systems_of
 
 path = Path(sys.argv[1])
 model = build(case_from(read_tables(path), path)).model

@@ -12,7 +12,7 @@ import pytest
 from fabfem.fem.box import box_mesh
 from fabfem.fem.kinematics import KINEMATICS
 from fabfem.fem.mesh import owners
-from fabfem.fem.pores import porous
+from fabfem.fem.porous_space import porous
 from fabfem.fem.share import Share, carried, share_of
 from fabfem.fem.solve import Progress
 from fabfem.fem.space import build_space
