@@ -1,6 +1,6 @@
 """How a run of any scene ended, and what a scene says about itself before it runs."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from enum import Enum
 from pathlib import Path
@@ -65,9 +65,12 @@ class Pricing(Enum):
     KNOWN = "say it where a run of the kind has been measured"
     PILOT = "else measure the beginning of one"
 
-    def allows(self, known: bool) -> bool:
-        """Return whether a time may be told that is known from an earlier run, or not."""
-        return self is Pricing.PILOT or (self is Pricing.KNOWN and known)
+    def time(self, known: bool, told: Callable[[], str]) -> str:
+        """Return what a run will cost in time, as `told` finds out; nothing where that may not be done.
+
+        `known` says whether a run of the kind has been measured.
+        """
+        return told() if self is Pricing.PILOT or (self is Pricing.KNOWN and known) else ""
 
 
 class FolderError(CaseError):

@@ -10,12 +10,31 @@ import hashlib
 import json
 import os
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple, TypeVar
 
 from fabfem.output.atomic import write_atomic
 from umat.cache import VARIABLE, user_cache
+
+R = TypeVar("R")
+"""Record of the rates of a kind of run."""
+
+
+class Price(NamedTuple):
+    """What a run will cost."""
+
+    seconds: float
+    """Wall time on a machine that does nothing else, from the command to its end [s]."""
+    source: str
+    """Where the rates come from."""
+    evaluations: float | None = None
+    """Evaluations of the material, where they are known."""
+
+    def told(self) -> str:
+        """Return it in words."""
+        counted = "" if self.evaluations is None else f", {self.evaluations:.2g} evaluations"
+        return f"about {duration(self.seconds)}{counted}, judged by {self.source}"
 
 
 class Stopwatch:
@@ -57,6 +76,19 @@ def stored(said: Any) -> dict[str, Any] | None:
         return dict(json.loads(_file(said).read_text(encoding="utf-8")))
     except (OSError, ValueError, TypeError):
         return None
+
+
+def known(record: Callable[..., R], said: Any) -> R | None:
+    """Return the rates of a kind of run as a record, if they are known and were stored from such a one."""
+    try:
+        return record(**(stored(said) or {}))
+    except TypeError:
+        return None
+
+
+def source(whole: bool, pilot: str) -> str:
+    """Return where rates come from: a whole run, or the `pilot` of the run in question."""
+    return f"{'a run of this kind' if whole else pilot} on this machine"
 
 
 def store(said: Any, rates: Mapping[str, Any]) -> None:

@@ -15,8 +15,6 @@ from fabfem.case.stages import Geostatic, Gravity
 from fabfem.fem.constraints import constrain
 from fabfem.fem.increment import Increment
 from fabfem.fem.points import stress_of
-from fabfem.fem.space import Space
-from umat.mandel import Array
 
 BALANCED = 1e-6
 """Relative out-of-balance force below which a guess is in balance."""
@@ -33,7 +31,7 @@ def audit(problem: Problem, increment: Increment) -> dict[str, Any]:
     found: dict[str, Any] = {
         "stage": increment.stage,
         "out_of_balance": increment.out_of_balance if geostatic else increment.residuals[-1],
-        "moved": _farthest(problem.model.space, increment.displacement),
+        "moved": problem.model.space.farthest(increment.displacement),
         "yielded": yielded(problem, increment),
     }
     if geostatic and found["out_of_balance"] > BALANCED:
@@ -52,11 +50,6 @@ def yielded(problem: Problem, increment: Increment) -> float | None:
             known, total = known + volume[strain > 0.0].sum(), total + volume.sum()
     known, total = space.mesh.ranks.sum(known), space.mesh.ranks.sum(total)
     return float(known / total) if total else None
-
-
-def _farthest(space: Space, displacement: Array) -> float:
-    """Return the largest displacement of a node."""
-    return space.mesh.ranks.largest(float(np.linalg.norm(space.displacement(displacement), axis=1).max()))
 
 
 def _worst(problem: Problem, increment: Increment) -> dict[str, Any]:

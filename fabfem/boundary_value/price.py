@@ -16,7 +16,7 @@ from fabfem.case import BoundaryValueCase
 from fabfem.case.stages import AnyStage
 from fabfem.fem.model import Controls
 from fabfem.fem.solve import Increment, march
-from fabfem.rates import Stopwatch, share_of, start_of
+from fabfem.rates import Price, Stopwatch, share_of, source, start_of
 
 PILOT, PATIENCE = 10.0, 30.0
 """Own time, and wall time, after which a pilot is left with the increment that goes on then [s]."""
@@ -45,23 +45,13 @@ class Rates(NamedTuple):
     """Whether a whole run was measured, or a pilot."""
 
 
-class Price(NamedTuple):
-    """What a run will cost."""
-
-    seconds: float
-    """Wall time on a machine that does nothing else, from the command to its end [s]."""
-    source: str
-    """Where the rates come from."""
-
-
 def price(problem: Problem) -> Price:
     """Return what a problem will cost; without rates of its kind a pilot measures them, in ten seconds or so."""
     rates = stored(problem.case)
     if rates is None:
         rates = _pilot(problem)
         _store(problem.case, rates)
-    source = "a run of this kind on this machine" if rates.whole else "its first increments on this machine"
-    return Price(predicted(problem, rates), source)
+    return Price(predicted(problem, rates), source(rates.whole, "its first increments"))
 
 
 def predicted(problem: Problem, rates: Rates) -> float:
@@ -128,10 +118,7 @@ def _pilot(problem: Problem) -> Rates:
 
 def stored(case: BoundaryValueCase) -> Rates | None:
     """Return the rates of the kind of a case, if they are known."""
-    try:
-        return Rates(**(kept.stored(_kind(case)) or {}))
-    except TypeError:
-        return None
+    return kept.known(Rates, _kind(case))
 
 
 def _store(case: BoundaryValueCase, rates: Rates) -> None:

@@ -26,7 +26,6 @@ from fabfem.output.checkpoints import Checkpoint
 from fabfem.output.interrupt import held_back, patient
 from fabfem.output.progress import Quiet
 from fabfem.output.progress import shown as progress
-from fabfem.rates import duration
 from fabfem.restart import FRESH, Restart, checkpoint_of
 from fabfem.timing import Timer
 
@@ -40,15 +39,8 @@ def describe(case: BoundaryValueCase, pricing: Pricing = Pricing.NONE) -> Descri
         If the case cannot be run.
     """
     problem = build(case)
-    return Description(problem.omitted, tuple(remaining(problem.model)), memory(problem.model), _time(problem, pricing))
-
-
-def _time(problem: Problem, pricing: Pricing) -> str:
-    """Return what a run will cost in time, in words, if that may be found out."""
-    if not pricing.allows(stored(problem.case) is not None):
-        return ""
-    cost = price(problem)
-    return f"about {duration(cost.seconds)}, judged by {cost.source}"
+    time = pricing.time(stored(case) is not None, lambda: price(problem).told())
+    return Description(problem.omitted, tuple(remaining(problem.model)), memory(problem.model), time)
 
 
 def remember(case: BoundaryValueCase, folder: Path) -> None:

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 from fabfem import rates as kept
 from fabfem.case import FabricCase
 from fabfem.fabric_tests.drives import Measured
-from fabfem.rates import Stopwatch, share_of, start_of
+from fabfem.rates import Price, Stopwatch, share_of, source, start_of
 
 PILOT = 5.0
 """Time after which a pilot is left [s]."""
@@ -28,24 +28,13 @@ class Rates(NamedTuple):
     """Whether a whole run was measured, or a pilot."""
 
 
-class Price(NamedTuple):
-    """What a run will cost."""
-
-    seconds: float
-    """Wall time on a machine that does nothing else, from the command to its end [s]."""
-    source: str
-    """Where the rates come from."""
-
-
 def price(case: FabricCase, measure: Callable[[], Measured]) -> Price:
     """Return what a run will cost; without rates of its kind a pilot measures the beginning of its table."""
     rates = stored(case)
     if rates is None:
         rates = _pilot(measure)
         kept.store(_kind(case), rates._asdict())
-    return Price(
-        rates.seconds, "a run of this kind on this machine" if rates.whole else "its first curves on this machine"
-    )
+    return Price(rates.seconds, source(rates.whole, "its first curves"))
 
 
 def remember(case: FabricCase, report: dict[str, Any]) -> None:
@@ -56,10 +45,7 @@ def remember(case: FabricCase, report: dict[str, Any]) -> None:
 
 def stored(case: FabricCase) -> Rates | None:
     """Return the rates of the kind of a case, if they are known."""
-    try:
-        return Rates(**(kept.stored(_kind(case)) or {}))
-    except TypeError:
-        return None
+    return kept.known(Rates, _kind(case))
 
 
 def _pilot(measure: Callable[[], Measured]) -> Rates:

@@ -15,7 +15,6 @@ from fabfem.outcome import Description, Outcome, Pricing, claimed, short, unwrit
 from fabfem.output.history import History
 from fabfem.output.interrupt import held_back
 from fabfem.output.report import Report
-from fabfem.rates import duration
 from fabfem.restart import FRESH, Restart
 from fabfem.timing import Timer
 
@@ -59,16 +58,8 @@ def _(drive: said.Contacts, case: FabricCase) -> Measured:
 
 def describe(case: FabricCase, pricing: Pricing = Pricing.NONE) -> Description:
     """Return what a case leaves out and what remains; see `fabfem.run.describe_case`."""
-    time = _time(case, pricing)
+    time = pricing.time(stored(case) is not None, lambda: price(case, lambda: measure(case.drive, case)).told())
     return Description(OMITTED, measure(case.drive, case).remains, time=time)
-
-
-def _time(case: FabricCase, pricing: Pricing) -> str:
-    """Return what a run will cost in time, in words, if that may be found out."""
-    if not pricing.allows(stored(case) is not None):
-        return ""
-    cost = price(case, lambda: measure(case.drive, case))
-    return f"about {duration(cost.seconds)}, judged by {cost.source}"
 
 
 def remember(case: FabricCase, folder: Path) -> None:

@@ -17,7 +17,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fabfem.fem.increment import advanced, largest
+from fabfem.fem.increment import advanced
 from fabfem.fem.newton import solve_increment, solved, stiffness_of
 from fabfem.fem.points import Refusal, elastic_tangents
 from fabfem.fem.trial import Equilibrium, System, Task, Trial, relative
@@ -69,7 +69,7 @@ def flow(system: System, now: Equilibrium, load: np.ndarray, enough: float) -> F
         old, now = now, advanced(now, trial)
         drag, moved = (
             relative(system, system.space.norm(trial.drag), trial.force, load),
-            largest(system, now.displacement - start.displacement),
+            system.space.farthest(now.displacement - start.displacement),
         )
         reached = Flow(UNDECIDED, "", old, now, trial, drag, moved, iterations, answer.residuals)
         if max(drag, trial.residual) <= system.controls.tolerance:
@@ -103,7 +103,7 @@ def elastic_displacement(system: System, now: Equilibrium, load: np.ndarray) -> 
     tangent = elastic_tangents(system.space, system.zones, now.states)
     task = Task(load, np.zeros(len(load)), None)
     answer = solved(system, stiffness_of(system, task, tangent), system.constraints.collect(load))
-    return np.inf if isinstance(answer, Refusal) else largest(system, system.constraints.spread(answer))
+    return np.inf if isinstance(answer, Refusal) else system.space.farthest(system.constraints.spread(answer))
 
 
 def _drag_at(drags: list[tuple[float, float]], moved: float) -> float:

@@ -184,12 +184,6 @@ def advanced(old: Equilibrium, trial: Trial) -> Equilibrium:
     return Equilibrium(old.displacement + trial.step, trial.batch.states, trial.skeleton, trial.batch.tangent)
 
 
-def largest(system: System, displacement: np.ndarray) -> float:
-    """Length of the largest displacement of a node."""
-    there = np.linalg.norm(system.space.displacement(displacement), axis=1)
-    return system.space.mesh.ranks.largest(float(there.max()))
-
-
 def increment(
     place: Place,
     number: int,
@@ -223,7 +217,7 @@ def increment(
         out_of_balance=relative(system, start, force, step.load),
         drag=relative(system, system.space.norm(trial.drag), trial.force, step.load),
         held=trial.batch.held,
-        moved=largest(system, trial.step),
+        moved=system.space.farthest(trial.step),
         cutbacks=step.cutbacks,
         worst_point=trial.batch.worst_point,
         worst_error=trial.batch.worst_error,

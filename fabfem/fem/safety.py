@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from fabfem.fem.flow import EQUILIBRIUM, Flow, elastic_displacement, flow
-from fabfem.fem.increment import Collapsed, Cutback, Factor, Increment, Place, Step, advanced, increment, largest
+from fabfem.fem.increment import Collapsed, Cutback, Factor, Increment, Place, Step, advanced, increment
 from fabfem.fem.loads import Loading
 from fabfem.fem.model import weaken
 from fabfem.fem.newton import Solved, solve_increment
@@ -158,7 +158,7 @@ def _rest(new: Try, now: Equilibrium) -> Equilibrium:
 def _entry(new: Try, system: System, start: np.ndarray, now: Equilibrium) -> Factor:
     end = _rest(new, now)
     drag = new.fluent.drag if new.fluent and new.verdict != EQUILIBRIUM else 0.0
-    return Factor(new.factor, new.verdict, largest(system, end.displacement - start), drag)
+    return Factor(new.factor, new.verdict, system.space.farthest(end.displacement - start), drag)
 
 
 def _recorded(

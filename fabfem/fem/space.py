@@ -146,6 +146,10 @@ class Space:
         full[:, self.kinematics.axes] = u.reshape(len(full), -1)
         return full
 
+    def farthest(self, u: np.ndarray) -> float:
+        """Length of the largest displacement of a node, of all ranks."""
+        return self.mesh.ranks.largest(float(np.linalg.norm(self.displacement(u), axis=1).max()))
+
     def at_rest(self, u: np.ndarray) -> np.ndarray:
         """The unknowns with the displacement set to zero."""
         return np.zeros_like(u)

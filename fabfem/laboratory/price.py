@@ -18,7 +18,7 @@ from fabfem.case.paths import ElementStage, Path, Probe
 from fabfem.laboratory.plans import plan
 from fabfem.laboratory.specimen import Specimen
 from fabfem.laboratory.stages import End, path
-from fabfem.rates import Stopwatch, share_of, start_of
+from fabfem.rates import Price, Stopwatch, share_of, source, start_of
 
 PILOT = 2.0
 """Time after which a pilot is left [s]."""
@@ -43,32 +43,20 @@ class Rates(NamedTuple):
     """Whether a whole run was measured, or a pilot."""
 
 
-class Price(NamedTuple):
-    """What a test will cost."""
-
-    seconds: float
-    """Wall time on a machine that does nothing else, from the command to its end [s]."""
-    evaluations: float
-    """Evaluations of the material."""
-    source: str
-    """Where the rates come from."""
-
-
 def price(specimen: Specimen) -> Price:
     """Return what a test will cost; without rates of its kind a pilot measures them, in two seconds or so."""
     rates = stored(specimen.case)
     if rates is None:
         rates = _pilot(specimen)
         kept.store(_kind(specimen.case), rates._asdict())
-    source = "a run of this kind on this machine" if rates.whole else "its first rows on this machine"
-    return predicted(specimen, rates)._replace(source=source)
+    return predicted(specimen, rates)
 
 
 def predicted(specimen: Specimen, rates: Rates) -> Price:
     """Return the price of a test at some rates."""
     evaluations = rates.evaluations * sum(max(rows, rates.steps) for rows in legs(specimen))
     spent = rates.evaluation * evaluations + rates.row * sum(legs(specimen))
-    return Price(rates.start + spent, evaluations, "")
+    return Price(rates.start + spent, source(rates.whole, "its first rows"), evaluations)
 
 
 def legs(specimen: Specimen) -> list[int]:
@@ -99,10 +87,7 @@ def remember(specimen: Specimen, report: dict[str, Any]) -> None:
 
 def stored(case: ElementCase) -> Rates | None:
     """Return the rates of the kind of a test, if they are known."""
-    try:
-        return Rates(**(kept.stored(_kind(case)) or {}))
-    except TypeError:
-        return None
+    return kept.known(Rates, _kind(case))
 
 
 def _rates(specimen: Specimen, taken: tuple[int, int, int], seconds: float) -> Rates:

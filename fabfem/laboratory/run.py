@@ -20,7 +20,6 @@ from fabfem.outcome import INTERRUPTED, Description, Outcome, Pricing, claimed, 
 from fabfem.output.interrupt import held_back, patient
 from fabfem.output.progress import Quiet
 from fabfem.output.progress import shown as progress
-from fabfem.rates import duration
 from fabfem.restart import FRESH, Restart, checkpoint_of
 from fabfem.timing import Timer
 from umat.mandel import Array
@@ -38,15 +37,8 @@ def describe(case: ElementCase, pricing: Pricing = Pricing.NONE) -> Description:
         If the case cannot be run.
     """
     specimen = build(case)
-    return Description(specimen.omitted, tuple(_remaining(specimen)), time=_time(specimen, pricing))
-
-
-def _time(specimen: Specimen, pricing: Pricing) -> str:
-    """Return what a run will cost in time, in words, if that may be found out."""
-    if not pricing.allows(stored(specimen.case) is not None):
-        return ""
-    cost = price(specimen)
-    return f"about {duration(cost.seconds)}, {cost.evaluations:.2g} evaluations, judged by {cost.source}"
+    time = pricing.time(stored(case) is not None, lambda: price(specimen).told())
+    return Description(specimen.omitted, tuple(_remaining(specimen)), time=time)
 
 
 def remember(case: ElementCase, folder: Folder) -> None:
