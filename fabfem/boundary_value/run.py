@@ -1,6 +1,5 @@
 """A boundary-value run from the case to the last row: march the problem, write what converges, say how it ended."""
 
-import json
 from collections.abc import Iterator
 from contextlib import nullcontext
 from pathlib import Path
@@ -26,6 +25,7 @@ from fabfem.output.checkpoints import Checkpoint
 from fabfem.output.interrupt import held_back, patient
 from fabfem.output.progress import Quiet
 from fabfem.output.progress import shown as progress
+from fabfem.output.report import read_report
 from fabfem.restart import FRESH, Restart, checkpoint_of
 from fabfem.timing import Timer
 
@@ -45,7 +45,7 @@ def describe(case: BoundaryValueCase, pricing: Pricing = Pricing.NONE) -> Descri
 
 def remember(case: BoundaryValueCase, folder: Path) -> None:
     """Keep what a completed run has cost, for the price of the next one of its kind."""
-    remember_run(build(case), json.loads((folder / "report.json").read_text(encoding="utf-8")))
+    remember_run(build(case), read_report(folder))
 
 
 def run(

@@ -1,14 +1,16 @@
-"""The columns of a history: what is said of a fabric, and of the stress and strain it stands under.
+"""The columns of a history, of a fabric and of the stress and strain it stands under, and the lines of a file of them.
 
 A value that has no meaning is left empty: F_b and the angle of an isotropic fabric, the angle to a stress without a
 major axis.
 """
 
+import csv
 from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 
+from fabfem.case import FabricCase
 from fabfem.fabric_tests.drives import Value
 from fabfem.units import Units
 from umat.fabric.probe_2d import anisotropy
@@ -30,6 +32,15 @@ DRIVE = {
 
 FABRIC = (*(f"F_{axes}" for axes in AXES), "F_norm", "F_q", "F_b", "F_n", "angle", "Z", "A")
 """Columns of the fabric."""
+
+
+def read_lines(case: FabricCase, name: str) -> list[list[str]]:
+    """Return the header and the rows of a file of columns, without comments; ValueError if it cannot be read."""
+    try:
+        with case.locate(name).open(encoding="utf-8", newline="") as file:
+            return [line for line in csv.reader(line for line in file if not line.startswith("#")) if line]
+    except (OSError, UnicodeDecodeError) as error:
+        raise ValueError(f"{name} cannot be read ({getattr(error, 'strerror', None) or error})") from None
 
 
 def headers(units: Units) -> tuple[str, ...]:

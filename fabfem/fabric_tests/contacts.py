@@ -1,6 +1,5 @@
 """Statistics of contact normals, from a file or drawn from a density, over the first 10, 20, 50, … of them."""
 
-import csv
 from collections.abc import Iterator
 
 import numpy as np
@@ -8,7 +7,7 @@ import numpy as np
 from fabfem.case import FabricCase
 from fabfem.case import fabric as said
 from fabfem.case.materials import Fabric
-from fabfem.fabric_tests.columns import AXES
+from fabfem.fabric_tests.columns import AXES, read_lines
 from fabfem.fabric_tests.curves import VERTICAL
 from fabfem.fabric_tests.drives import Block, Measured, Value, blamed
 from fabfem.substance import deposit
@@ -44,11 +43,7 @@ def measure(drive: said.Contacts, case: FabricCase) -> Measured:
 
 def _read(drive: said.Contacts, case: FabricCase) -> Array:
     """Return the normals of a file; ValueError names the line that is wrong."""
-    try:
-        with case.locate(str(drive.file)).open(encoding="utf-8", newline="") as file:
-            lines = [line for line in csv.reader(line for line in file if not line.startswith("#")) if line]
-    except (OSError, UnicodeDecodeError) as error:
-        raise ValueError(f"{drive.file} cannot be read ({getattr(error, 'strerror', None) or error})") from None
+    lines = read_lines(case, str(drive.file))
     headers = [header.split("[")[0].strip() for header in lines[0]] if lines else []
     at = [headers.index(name) for name in ("nx", "ny", "nz") if name in headers]
     if len(at) < 2 or "nx" not in headers or "ny" not in headers:

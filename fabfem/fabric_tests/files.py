@@ -1,12 +1,10 @@
 """Histories from a file of columns; their names and units are in docs/fabric_laws.md."""
 
-import csv
-
 import numpy as np
 
 from fabfem.case import CaseError, FabricCase, suggest
 from fabfem.case import fabric as said
-from fabfem.fabric_tests.columns import AXES
+from fabfem.fabric_tests.columns import AXES, read_lines
 from fabfem.fabric_tests.curves import Curve
 from fabfem.fabric_tests.drives import blamed
 from fabfem.fabric_tests.group import Group
@@ -32,12 +30,7 @@ def read_histories(drive: said.History, case: FabricCase, laws: tuple[Curve, ...
 
 def _read(case: FabricCase, drive: said.History) -> tuple[dict[str, Array], list[str]]:
     """Return the numbers by the names of `docs/fabric_laws.md`, and the name of each row's path."""
-    source = case.locate(drive.file)
-    try:
-        with source.open(encoding="utf-8", newline="") as file:
-            lines = [line for line in csv.reader(line for line in file if not line.startswith("#")) if line]
-    except (OSError, UnicodeDecodeError) as error:
-        raise ValueError(f"{drive.file} cannot be read ({getattr(error, 'strerror', None) or error})") from None
+    lines = read_lines(case, drive.file)
     if len(lines) < 3:
         raise ValueError(f"{drive.file} needs a header and two records at least")
     headers = [header.split("[")[0].strip() for header in lines[0]]

@@ -1,6 +1,5 @@
 """A case on fabric laws from the case to the last row: its one drive makes a table, which is written block by block."""
 
-import json
 from collections.abc import Iterator
 from functools import singledispatch
 from pathlib import Path
@@ -14,7 +13,7 @@ from fabfem.fabric_tests.price import remember as remember_run
 from fabfem.outcome import Description, Outcome, Pricing, claimed, short, unwritten
 from fabfem.output.history import History
 from fabfem.output.interrupt import held_back
-from fabfem.output.report import Report
+from fabfem.output.report import Report, read_report
 from fabfem.restart import FRESH, Restart
 from fabfem.timing import Timer
 
@@ -64,7 +63,7 @@ def describe(case: FabricCase, pricing: Pricing = Pricing.NONE) -> Description:
 
 def remember(case: FabricCase, folder: Path) -> None:
     """Keep what a completed run has cost, for the price of the next one of its kind."""
-    remember_run(case, json.loads((folder / "report.json").read_text(encoding="utf-8")))
+    remember_run(case, read_report(folder))
 
 
 def run(case: FabricCase, folder: Path, quiet: bool, timer: Timer | None = None, restart: Restart = FRESH) -> Outcome:

@@ -1,6 +1,5 @@
 """An element test from the case to the last row: lead the specimen through its stages, write, say how it ended."""
 
-import json
 from collections.abc import Callable, Iterator
 from pathlib import Path as Folder
 from typing import Any
@@ -20,6 +19,7 @@ from fabfem.outcome import INTERRUPTED, Description, Outcome, Pricing, claimed, 
 from fabfem.output.interrupt import held_back, patient
 from fabfem.output.progress import Quiet
 from fabfem.output.progress import shown as progress
+from fabfem.output.report import read_report
 from fabfem.restart import FRESH, Restart, checkpoint_of
 from fabfem.timing import Timer
 from umat.mandel import Array
@@ -43,7 +43,7 @@ def describe(case: ElementCase, pricing: Pricing = Pricing.NONE) -> Description:
 
 def remember(case: ElementCase, folder: Folder) -> None:
     """Keep what a completed run has cost, for the price of the next one of its kind."""
-    remember_run(build(case), json.loads((folder / "report.json").read_text(encoding="utf-8")))
+    remember_run(build(case), read_report(folder))
 
 
 def _remaining(specimen: Specimen) -> Iterator[tuple[str, str]]:

@@ -73,6 +73,14 @@ class Unheard(History):
         """Close nothing."""
 
 
+def number_of(text: str) -> float:
+    """Return an entry of a table; NaN where it is none, or empty."""
+    try:
+        return float(text)
+    except ValueError:
+        return float("nan")
+
+
 def read_history(path: Path) -> tuple[list[str], list[list[str]]]:
     """Return the header and the rows of a history; a last line cut short by a kill is dropped.
 

@@ -18,6 +18,7 @@ from fabfem import __version__
 from fabfem.output.atomic import write_atomic
 
 PACKAGES = ("numpy", "scipy", "numba", "scikit-fem", "meshio", "pydantic", "pypardiso", "mpi4py", "petsc4py")
+FILE = "report.json"
 WORST = 5
 """Number of worst points kept."""
 
@@ -63,6 +64,11 @@ class Report:
         self.content["peak_memory"] = round(peak_memory(), 1)
         if self.path is not None:
             write_atomic(self.path, json.dumps(self.content, indent=1, default=_plain, allow_nan=False) + "\n")
+
+
+def read_report(folder: Path) -> dict[str, Any]:
+    """Return the report in the folder of a result."""
+    return dict(json.loads((folder / FILE).read_text(encoding="utf-8")))
 
 
 def versions() -> dict[str, str]:

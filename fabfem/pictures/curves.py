@@ -5,7 +5,6 @@ panels. What is undefined is not drawn.
 """
 
 import csv
-import json
 from itertools import cycle
 from pathlib import Path
 from textwrap import fill
@@ -19,6 +18,8 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from fabfem.case import CaseError, suggest
+from fabfem.output.history import number_of
+from fabfem.output.report import read_report
 
 STYLES = ("-", "--", ":", "-.", (0, (6, 1, 1, 1, 1, 1)), (0, (1, 3)))
 MANY = 3
@@ -35,7 +36,7 @@ def draw(folder: Path) -> tuple[Path, ...]:
     CaseError
         If a picture names a column that the history does not have.
     """
-    report = json.loads((folder / "report.json").read_text(encoding="utf-8"))
+    report = read_report(folder)
     curves, headers = _read(folder / "history.csv")
     return tuple(
         _picture(folder, picture, curves, headers, str(report.get("title", "")))
@@ -53,17 +54,10 @@ def _read(path: Path) -> tuple[dict[tuple[str, str], dict[str, Any]], dict[str, 
         row = dict(zip(names, line, strict=False))
         groups.setdefault((row.get("law", ""), row.get("path", "")), []).append(line)
     curves = {
-        key: {name: np.array([_number(line[i]) for line in rows]) for i, name in enumerate(names)}
+        key: {name: np.array([number_of(line[i]) for line in rows]) for i, name in enumerate(names)}
         for key, rows in groups.items()
     }
     return curves, dict(zip(names, lines[0], strict=True))
-
-
-def _number(text: str) -> float:
-    try:
-        return float(text)
-    except ValueError:
-        return float("nan")
 
 
 def _picture(folder: Path, picture: Any, curves: Any, headers: dict[str, str], title: str) -> Path:

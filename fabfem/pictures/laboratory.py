@@ -1,7 +1,6 @@
 """Pictures of an element test: the curves of its history, rose diagrams, and response envelopes of probes."""
 
 import csv
-import json
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -14,6 +13,7 @@ from numpy.typing import NDArray
 
 from fabfem.laboratory.plans import basis
 from fabfem.output.history import read_history
+from fabfem.output.report import read_report
 from umat.mandel import FACTOR
 
 Array = NDArray[np.float64]
@@ -66,7 +66,7 @@ class Curves(NamedTuple):
 
 def draw(folder: Path) -> list[Path]:
     """Draw the pictures of an element test into its folder and return their files."""
-    report = json.loads((folder / "report.json").read_text(encoding="utf-8"))
+    report = read_report(folder)
     pictures = [_curves(folder, report)]
     pictures += [_roses(folder, report)] if (folder / "roses.csv").is_file() else []
     pictures += [_envelopes(folder, report)] if (folder / "probes.csv").is_file() else []

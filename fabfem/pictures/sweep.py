@@ -20,6 +20,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from fabfem.case import CaseError, suggest
+from fabfem.output.history import number_of
 from fabfem.pictures import calibration
 from fabfem.pictures.curves import STYLES
 from fabfem.pictures.laboratory import LABELS
@@ -90,7 +91,7 @@ def _states(folder: Path, about: Any, picture: Any) -> Figure:
             rows = [line for line in lines if line["state"] == state]
             for name in (x, y) if rows else ():
                 _known(name, units, folder, picture)
-            at = [(_number(row[x]), _number(row[y])) for row in rows]
+            at = [(number_of(row[x]), number_of(row[y])) for row in rows]
             label = f"{state.replace('_', ' ')} ({len(at)})"
             ax.plot(*(np.array(at).reshape(-1, 2).T), marker, color=colour, markersize=5, label=label)
             points += at
@@ -124,7 +125,7 @@ def _runs(lines: Sequence[dict[str, str]], parameters: Sequence[str], picture: A
         groups.setdefault(tuple(line[name] for name in parameters), []).append(line)
     runs = []
     for values, rows in groups.items():
-        columns = {name: np.array([_number(row[name]) for row in rows]) for name in rows[0]}
+        columns = {name: np.array([number_of(row[name]) for row in rows]) for name in rows[0]}
         past = np.zeros(len(rows), bool)
         if picture["until"]:
             past = np.asarray(columns[picture["until"]["column"]]) > picture["until"]["value"] * (1.0 + ROUNDING)
@@ -179,13 +180,6 @@ def _plain(ax: Axes, x: str, y: str, units: dict[str, str]) -> None:
 def _label(name: str, units: dict[str, str]) -> str:
     unit = units.get(name, "")
     return WORDS.get(name, name) + (f" [{unit}]" if unit not in ("-", "") else "")
-
-
-def _number(text: str) -> float:
-    try:
-        return float(text)
-    except ValueError:
-        return float("nan")
 
 
 def _short(value: str) -> str:
