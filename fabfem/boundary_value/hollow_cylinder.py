@@ -73,7 +73,11 @@ def hollow_cylinder_columns(case: BoundaryValueCase, space: Space) -> tuple[Colu
 def _columns(way: str, found: Callable[[Increment], dict[str, float]], stress: str) -> Iterator[Column]:
     units = dict.fromkeys(STRESS, stress) | dict.fromkeys(STRAIN, "-") | {"alpha": "deg", "b": "-"}
     for name, unit in units.items():
-        yield Column(f"{way}_{name}", unit, "average", lambda increment, name=name: found(increment)[name])  # type: ignore[misc]
+        yield Column(f"{way}_{name}", unit, "average", _entry(found, name))
+
+
+def _entry(found: Callable[[Increment], dict[str, float]], name: str) -> Callable[[Increment], float]:
+    return lambda increment: found(increment)[name]
 
 
 def _latest(measure: Callable[[Increment], dict[str, float]]) -> Callable[[Increment], dict[str, float]]:

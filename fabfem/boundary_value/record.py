@@ -24,7 +24,7 @@ from fabfem.fem.start import Start
 from fabfem.output.checkpoints import PATTERN as CHECKPOINTS
 from fabfem.output.checkpoints import SHARES, Checkpoint, Checkpoints
 from fabfem.output.history import History, Unheard
-from fabfem.output.report import Report
+from fabfem.output.report import Report, about
 from fabfem.output.view import write_view
 from fabfem.output.vtu import FieldFiles, FieldPieces, Frame
 from fabfem.timing import Timer
@@ -187,10 +187,8 @@ class Recorder:
         return self._pending
 
     def _write_report(self) -> None:
-        total = self.timer.total()
         self.report.content |= shares(self.problem.model.space, self.timer)
-        self.report.content["processor_time"] = self.timer.processor()
-        self.report.write({**self.timer.spent, "other": total - sum(self.timer.spent.values()), "total": total})
+        self.report.write_timed(self.timer)
 
 
 def recall(columns: Sequence[Column], keepers: Mapping[str, Any]) -> None:
@@ -211,9 +209,7 @@ def _head(problem: Problem) -> dict[str, Any]:
     kinds = ("probe", "reaction", "derived", "error")
     fields = case.output.fields if case.output else ()
     return {
-        "case": case.path.name,
-        "title": case.title,
-        "units": {**units._asdict(), "stress": units.label("stress")},
+        **about(case),
         "columns": {kind: [column.header for column in problem.columns if column.kind == kind] for kind in kinds},
         "fields": {name: units.label(QUANTITIES.get(name, "none")) for name in fields},
         "scene": dict(remaining(problem.model)),

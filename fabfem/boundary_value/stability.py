@@ -40,12 +40,12 @@ def second_order_work(space: Space, increment: Increment) -> Array:
 
 def acoustic_determinant(space: Space, increment: Increment) -> Array:
     """Return the least determinant (npoints,) of the acoustic tensor over that of the elastic tangent [-]."""
-    normals = _directions(space.mesh.dim)
+    normals = normals_of(space.mesh.dim)
     ratio = np.ones(space.npoints)
     tangent = tangents(space, increment.zones, space.strain(increment.step), increment.before)
     for name, zone in increment.zones.items():
         elastic = umat.elastic_tangent(zone.material, increment.states[name])
-        ratio[zone.points] = _least(tangent[zone.points], elastic, normals)
+        ratio[zone.points] = least_ratio(tangent[zone.points], elastic, normals)
     return ratio
 
 
@@ -67,7 +67,7 @@ def localisation(space: Space, increment: Increment) -> dict[str, Any]:
     }
 
 
-def _least(tangent: Array, elastic: Array, normals: Array) -> Array:
+def least_ratio(tangent: Array, elastic: Array, normals: Array) -> Array:
     """Return the least ratio (n,) over directions (m, 3), then over closer and closer ones around the best."""
     found = np.empty(len(tangent))
     for begin in range(0, len(tangent), BATCH):
@@ -112,7 +112,7 @@ def determinants(tangent: Array, normals: Array) -> Array:
     return np.linalg.det(operator.swapaxes(-1, -2) @ (tangent[:, None] @ operator))
 
 
-def _directions(dim: int) -> Array:
+def normals_of(dim: int) -> Array:
     """Return unit vectors (m, 3): over half a turn in the plane, or over half a sphere."""
     if dim == 2:
         angle = np.pi * np.arange(ANGLES) / ANGLES

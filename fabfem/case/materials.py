@@ -31,24 +31,25 @@ class Material(Table):
     """Volume of pores over the whole, for compressible water; a Chang-Hicher material has it from its void ratio."""
 
 
-class Elastic(Material):
+class Isotropic(Material):
+    """What every material of isotropic elasticity has."""
+
+    youngs_modulus: Positive
+    """Young's modulus [stress]."""
+    poisson_ratio: Annotated[float, Field(gt=-1, lt=0.5)] = 0.3
+    """Poisson's ratio."""
+
+
+class Elastic(Isotropic):
     """Linear isotropic elasticity."""
 
     model: Literal["elastic"]
-    youngs_modulus: Positive
-    """Young's modulus [stress]."""
-    poisson_ratio: Annotated[float, Field(gt=-1, lt=0.5)] = 0.3
-    """Poisson's ratio."""
 
 
-class VonMises(Material):
+class VonMises(Isotropic):
     """Plasticity of a strength that does not depend on the mean stress."""
 
     model: Literal["von_mises"]
-    youngs_modulus: Positive
-    """Young's modulus [stress]."""
-    poisson_ratio: Annotated[float, Field(gt=-1, lt=0.5)] = 0.3
-    """Poisson's ratio."""
     yield_stress: Positive
     """Yield stress in uniaxial loading, which is the square root of 3 times the shear strength [stress]."""
     hardening_modulus: float = 0.0
@@ -57,14 +58,10 @@ class VonMises(Material):
     """Yield stress at which softening ends [stress]."""
 
 
-class MohrCoulomb(Material):
+class MohrCoulomb(Isotropic):
     """Mohr-Coulomb strength with its own dilation angle."""
 
     model: Literal["mohr_coulomb"]
-    youngs_modulus: Positive
-    """Young's modulus [stress]."""
-    poisson_ratio: Annotated[float, Field(gt=-1, lt=0.5)] = 0.3
-    """Poisson's ratio."""
     cohesion: NotNegative = 0.0
     """Cohesion [stress]."""
     friction_angle: Annotated[float, Field(ge=0, lt=90)]
@@ -73,14 +70,10 @@ class MohrCoulomb(Material):
     """Dilation angle [degree]."""
 
 
-class DruckerPrager(Material):
+class DruckerPrager(Isotropic):
     """A cone in the space of principal stresses, with linear hardening."""
 
     model: Literal["drucker_prager"]
-    youngs_modulus: Positive
-    """Young's modulus [stress]."""
-    poisson_ratio: Annotated[float, Field(gt=-1, lt=0.5)] = 0.3
-    """Poisson's ratio."""
     friction_slope: NotNegative
     """Slope of the yield surface in the p-q plane."""
     dilation_slope: NotNegative = 0.0

@@ -71,7 +71,7 @@ def snap_back(length: float) -> Found:
     """
     shear, strength, residual = 1000.0, 10.0, 4.0
     joint_end = 0.04
-    answer = solve(_bar(length, shear, strength, residual, joint_end), _bar_mesh(length))
+    answer = solve(_bar(shear, strength, residual, joint_end), _bar_mesh(length))
     exact = joint_end + length * residual / shear
     return Found(answer.final("end"), exact, answer.stopped)
 
@@ -95,7 +95,7 @@ def _bar_mesh(length: float) -> Mesh:
     return replace(mesh, zones=zones, boundaries=mesh.boundaries | {"joint": joint})
 
 
-def _bar(length: float, shear: float, strength: float, residual: float, joint: float) -> Tables:
+def _bar(shear: float, strength: float, residual: float, joint: float) -> Tables:
     young = {"youngs_modulus": 2.5 * shear, "poisson_ratio": 0.25}
     root = 3.0**0.5
     soft = {"yield_stress": strength * root, "hardening_modulus": -1500.0, "residual_stress": residual * root}

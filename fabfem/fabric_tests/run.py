@@ -13,7 +13,7 @@ from fabfem.fabric_tests.price import remember as remember_run
 from fabfem.outcome import Description, Outcome, Pricing, claimed, short, unwritten
 from fabfem.output.history import History
 from fabfem.output.interrupt import held_back
-from fabfem.output.report import Report, read_report
+from fabfem.output.report import Report, about, read_report
 from fabfem.restart import FRESH, Restart
 from fabfem.timing import Timer
 
@@ -121,12 +121,9 @@ def _next(blocks: Iterator[Block], timer: Timer) -> Block | None:
 
 def _head(case: FabricCase, measured: Measured) -> dict[str, Any]:
     """Return what a report says before anything has run."""
-    units = case.unit_system
     return {
-        "case": case.path.name,
-        "title": case.title,
+        **about(case),
         "kind": case.scene.kind,
-        "units": {**units._asdict(), "stress": units.label("stress")},
         "columns": {},
         "scene": dict(measured.remains),
         "omitted": list(OMITTED),

@@ -61,7 +61,7 @@ def carried(pieces: Iterable[tuple[Share, Any]], here: Share) -> Any:
     template: Any = None
     for share, piece in pieces:
         found: list[tuple[str, np.ndarray]] = []
-        mapped(piece, "", lambda kind, array, found=found: found.append((kind, array)))  # type: ignore[misc]
+        mapped(piece, "", _noting(found))
         if template is None:
             template = piece
             whole = [np.zeros((len(here.numbers(kind)), *array.shape[1:]), array.dtype) for kind, array in found]
@@ -70,6 +70,11 @@ def carried(pieces: Iterable[tuple[Share, Any]], here: Share) -> Any:
             target[into] = array[of]
     rest = iter(whole)
     return mapped(template, "", lambda kind, array: next(rest))
+
+
+def _noting(found: list[tuple[str, np.ndarray]]) -> Callable[[str, np.ndarray], None]:
+    """Return what notes every array and its kind."""
+    return lambda kind, array: found.append((kind, array))
 
 
 def mapped(value: Any, kind: str, change: Callable[[str, np.ndarray], Any]) -> Any:

@@ -6,7 +6,7 @@ legs drifts from no condition.
 
 from collections.abc import Sequence
 from functools import singledispatch
-from typing import NamedTuple
+from typing import Literal, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -15,6 +15,7 @@ from umat import legs
 from umat.mandel import FACTOR, IDENTITY, Array, from_tensor, rotation
 from umat.step import Course
 
+Name = TypeVar("Name", bound=str)
 HELD: dict[str, legs.Held] = {"drained": "minor_stress", "undrained": "volume", "constant_p": "p"}
 
 
@@ -44,7 +45,7 @@ def _led(leg: legs.Leg, stage: said.Path, levels: tuple[float, ...]) -> Plan:
     return Plan(leg.on_stress, leg.on_strain, np.outer(levels * stage.cycles, leg.value))
 
 
-def _driver(stage: said.Path, *names: str) -> tuple[str, tuple[float, ...]]:
+def _driver(stage: said.Path, names: Sequence[Name]) -> tuple[Name, tuple[float, ...]]:
     """Return the name and the levels of the one driver that is given."""
     (name,) = (name for name in names if getattr(stage, name) is not None)
     return name, getattr(stage, name)
@@ -69,8 +70,8 @@ def _(stage: said.K0, stress: Array) -> Plan:
 
 def _shear(stage: said.Shear, alpha: float, b: float) -> Plan:
     names: tuple[legs.Driver, ...] = ("axial_strain", "shear_strain", "deviatoric_strain", "q")
-    driver, levels = _driver(stage, *names)
-    return _led(legs.fixed_axes(1.0, driver, HELD[stage.drainage], alpha, b), stage, levels)  # type: ignore[arg-type]
+    driver, levels = _driver(stage, names)
+    return _led(legs.fixed_axes(1.0, driver, HELD[stage.drainage], alpha, b), stage, levels)
 
 
 @plan.register
@@ -90,13 +91,14 @@ def _(stage: said.HollowCylinder, stress: Array) -> Plan:
 
 @plan.register
 def _(stage: said.PlaneStrain, stress: Array) -> Plan:
-    driver, levels = _driver(stage, "axial_strain", "q")
-    return _led(legs.biaxial(1.0, driver, HELD[stage.drainage]), stage, levels)  # type: ignore[arg-type]
+    names: tuple[Literal["axial_strain", "q"], ...] = ("axial_strain", "q")
+    driver, levels = _driver(stage, names)
+    return _led(legs.biaxial(1.0, driver, HELD[stage.drainage]), stage, levels)
 
 
 @plan.register
 def _(stage: said.SimpleShear, stress: Array) -> Plan:
-    driver, levels = _driver(stage, "shear_strain", "tau")
+    driver, levels = _driver(stage, ("shear_strain", "tau"))
     return _led(legs.simple_shear(1.0, driver == "tau", stage.drainage == "undrained"), stage, levels)
 
 

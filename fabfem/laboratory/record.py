@@ -18,7 +18,7 @@ from fabfem.laboratory.stages import End, Point
 from fabfem.output.checkpoints import PATTERN as CHECKPOINTS
 from fabfem.output.checkpoints import Checkpoint, Checkpoints
 from fabfem.output.history import History
-from fabfem.output.report import Report
+from fabfem.output.report import Report, about
 from fabfem.timing import Timer
 from umat import mandel, measures
 from umat.mandel import FACTOR, Array
@@ -147,9 +147,7 @@ class Recorder:
         return status, reason
 
     def _write(self) -> None:
-        total = self.timer.total()
-        self.report.content["processor_time"] = self.timer.processor()
-        self.report.write({**self.timer.spent, "other": total - sum(self.timer.spent.values()), "total": total})
+        self.report.write_timed(self.timer)
 
 
 def _between(rows: tuple[Row, Row], share: float) -> dict[str, Any]:
@@ -196,11 +194,9 @@ def _gathered(rows: list[Row], ending: bool) -> Rows:
 
 def _head(specimen: Specimen) -> dict[str, Any]:
     """Return what a report says before anything has run."""
-    case, units = specimen.case, specimen.case.unit_system
+    case = specimen.case
     return {
-        "case": case.path.name,
-        "title": case.title,
-        "units": {**units._asdict(), "stress": units.label("stress")},
+        **about(case),
         "columns": [column.header for column in specimen.columns],
         "accuracy": case.accuracy.curve,
         "omitted": list(specimen.omitted),

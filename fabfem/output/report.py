@@ -15,7 +15,9 @@ from typing import Any
 import numpy as np
 
 from fabfem import __version__
+from fabfem.case import Case
 from fabfem.output.atomic import write_atomic
+from fabfem.timing import Timer
 
 PACKAGES = ("numpy", "scipy", "numba", "scikit-fem", "meshio", "pydantic", "pypardiso", "mpi4py", "petsc4py")
 FILE = "report.json"
@@ -58,12 +60,28 @@ class Report:
         """Set how the run ended: ``completed``, ``stopped`` or ``interrupted``, and why."""
         self.content.update(status=status, reason=reason)
 
+    def write_timed(self, timer: Timer) -> None:
+        """Write the file with the time that a timer tells, what belongs to no phase as ``other``."""
+        total = timer.total()
+        self.content["processor_time"] = timer.processor()
+        self.write({**timer.spent, "other": total - sum(timer.spent.values()), "total": total})
+
     def write(self, wall_time: Mapping[str, float]) -> None:
         """Write the file with the wall time by phase [s] as it stands."""
         self.content["wall_time"] = {phase: round(seconds, 4) for phase, seconds in wall_time.items()}
         self.content["peak_memory"] = round(peak_memory(), 1)
         if self.path is not None:
             write_atomic(self.path, json.dumps(self.content, indent=1, default=_plain, allow_nan=False) + "\n")
+
+
+def about(case: Case) -> dict[str, Any]:
+    """Return what the report of any scene says first: file, title and units of its case."""
+    units = case.unit_system
+    return {
+        "case": case.path.name,
+        "title": case.title,
+        "units": {**units._asdict(), "stress": units.label("stress")},
+    }
 
 
 def read_report(folder: Path) -> dict[str, Any]:

@@ -60,8 +60,8 @@ def draw(folder: Path) -> tuple[Path, ...]:
 
 def _curves(folder: Path, about: Any, picture: Any) -> Figure:
     """Draw a panel for each pair of columns, with a line for each run."""
-    lines, units = _read(folder / "sweep.csv")
-    runs = list(_runs(lines, about["parameters"], picture))
+    lines, units = read_rows(folder / "sweep.csv")
+    runs = list(runs_of(lines, about["parameters"], picture))
     colour, style = picture["colour"] or about["parameters"][0], picture["style"]
     colours = _assigned(runs, colour, _shades)
     styles = _assigned(runs, style, lambda n: list(zip(range(n), cycle(STYLES), strict=False))) if style else {}
@@ -82,7 +82,7 @@ def _curves(folder: Path, about: Any, picture: Any) -> Figure:
 def _states(folder: Path, about: Any, picture: Any) -> Figure:
     """Draw the states as points, the best exponential through them and the curves of the source."""
     file = folder / "states.csv"
-    lines, units = _read(file) if file.is_file() else ([], {})
+    lines, units = read_rows(file) if file.is_file() else ([], {})
     figure, axes = _figure(len(picture["x"]))
     fits = about["fits"].get(picture["name"]) or []
     for ax, x, y, fit in zip(axes, picture["x"], picture["y"], fits, strict=False):
@@ -118,7 +118,7 @@ def _exponentials(ax: Axes, points: Sequence[tuple[float, float]], fit: Any, cur
     ax.set_ylim(0.0, top)
 
 
-def _runs(lines: Sequence[dict[str, str]], parameters: Sequence[str], picture: Any) -> list[Run]:
+def runs_of(lines: Sequence[dict[str, str]], parameters: Sequence[str], picture: Any) -> list[Run]:
     """Return the runs of a table with a row for each row of each history, up to where the picture ends."""
     groups: dict[tuple[str, ...], list[dict[str, str]]] = {}
     for line in lines:
@@ -134,7 +134,7 @@ def _runs(lines: Sequence[dict[str, str]], parameters: Sequence[str], picture: A
     return runs
 
 
-def _read(path: Path) -> tuple[list[dict[str, str]], dict[str, str]]:
+def read_rows(path: Path) -> tuple[list[dict[str, str]], dict[str, str]]:
     """Return the rows of a table by column, and the unit of each column."""
     with path.open(encoding="utf-8", newline="") as file:
         header, *rows = list(csv.reader(file))

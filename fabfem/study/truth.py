@@ -61,7 +61,7 @@ def truth(study: Study, values: Values, case: str) -> Known:
     if said is not None and said.exact is not None:
         return Known(np.array([said.exact]), 0.0, "the exact answer that the case names")
     if said is not None and said.richardson is not None:
-        return _extrapolated(study, knob_named(study, said.richardson, case), values, case)
+        return _extrapolated(knob_named(study, said.richardson, case), values, case)
     run = finest(study)
     if run not in values:
         raise CaseError(f"{case}: study.truth: the finest run does not have the quantity of interest")
@@ -70,7 +70,7 @@ def truth(study: Study, values: Values, case: str) -> Known:
     return Known(values[run], doubt, f"{how}; the last step of all knobs together changes {100.0 * doubt:.2g} %")
 
 
-def _extrapolated(study: Study, knob: Knob, values: Values, case: str) -> Known:
+def _extrapolated(knob: Knob, values: Values, case: str) -> Known:
     pairs = [(size, values[(s,)]) for size, s in zip(sizes_of(knob), settings_of(knob), strict=True) if (s,) in values]
     numbers = [(size, float(value[0])) for size, value in pairs if value.ndim == 1]
     if len(numbers) < 2:

@@ -56,7 +56,7 @@ class Standing(NamedTuple):
     """What each knob changes when it alone is turned to its last value."""
 
 
-def orders(study: Study, rows: Sequence[Measured], values: Values, known: Known) -> Iterator[Order]:
+def orders(study: Study, rows: Sequence[Measured], values: Values) -> Iterator[Order]:
     """Yield the orders of the knobs that have an expected one."""
     errors = {row.run.choice: row.error for row in rows}
     for knob in study.knob:
@@ -90,7 +90,7 @@ def sentences(study: Study, rows: Sequence[Measured], known: Known, values: Valu
     """Yield what the study comes to, a sentence each."""
     number = f" {known.value[0]:.7g}" if known.value.ndim == 1 else ""
     yield f"The true {study.quantity.column}{number} is {known.how}."
-    for order in orders(study, rows, values, known):
+    for order in orders(study, rows, values):
         yield _order(order)
     for largest in WANTED:
         yield _cheapest(study, rows, largest, known)

@@ -65,7 +65,7 @@ def study(path: Path, folder: Path, quiet: bool = False) -> Studied:
             found = {run.choice: run for run in shown(runs(plan, pool), len(wanted), quiet)}
         values, troubles = _values(said, found)
         known = truth(said, values, path.name)
-        rows = [_measured(said, found[choice], values, known, troubles) for choice in _listed(said, wanted)]
+        rows = [_measured(found[choice], values, known, troubles) for choice in _listed(said, wanted)]
         return _write(case, said, folder, rows, known, values)
 
 
@@ -100,7 +100,7 @@ def _values(said: Study, found: dict[Choice, Run]) -> tuple[dict[Choice, Array],
     return values, troubles
 
 
-def _measured(said: Study, run: Run, values: Values, known: Known, troubles: dict[Choice, str]) -> Measured:
+def _measured(run: Run, values: Values, known: Known, troubles: dict[Choice, str]) -> Measured:
     value = values.get(run.choice)
     error = float("nan") if value is None else distance(value, known.value)
     wall, cpu = (median(times) if times else float("nan") for times in (run.ran.wall, run.ran.cpu))
@@ -124,7 +124,7 @@ def _write(case: Case, said: Study, folder: Path, rows: Sequence[Measured], know
         "truth": {"value": known.value.tolist(), "doubt": known.doubt, "how": known.how},
         "clock": said.clock,
         "turn": said.turn,
-        "orders": [order._asdict() for order in orders(said, rows, values, known)],
+        "orders": [order._asdict() for order in orders(said, rows, values)],
         "rows": [_drawn(row, said, bool(best)) for row, best in zip(rows, front, strict=True)],
         "sentences": found,
         "standing": own._asdict() if own else None,

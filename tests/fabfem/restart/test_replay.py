@@ -15,7 +15,6 @@ from fabfem.replay import replay
 from fabfem.run import run_case
 
 LOWEST = {"increments": {"initial": 0.5, "maximum": 0.5, "minimum": 0.2}}
-PULLED = pushed(-0.5, **LOWEST)
 LIMITED = SAND | FABRIC | {"parameters": {"max_evaluations": 3}}
 OVERLOADED = {"name": "press", "kind": "load", "pressure": [{"boundary": "top", "value": 5000.0}], **LOWEST}
 

@@ -120,10 +120,10 @@ def test_pictures_of_a_sweep_are_drawn_again_by_show(swept):
 
 
 def test_a_picture_ends_where_it_is_told(swept):
-    from fabfem.pictures.sweep import _read, _runs
+    from fabfem.pictures.sweep import read_rows, runs_of
 
     until = {"until": {"column": "eps_axial", "value": 0.0055}}
-    runs = _runs(_read(swept / "sweep.csv")[0], ["test"], until)
+    runs = runs_of(read_rows(swept / "sweep.csv")[0], ["test"], until)
     assert [run["test"] for run in runs] == ["soft", "stiff"]
     assert all(run["columns"]["eps_axial"][-1] == pytest.approx(0.005) for run in runs)
 
