@@ -105,6 +105,7 @@ def _(material: Elastic, factor: float) -> Elastic:
     return material
 
 
-@elastic_tangent.register
-def _(material: Elastic, state: ElasticState) -> Array:
-    return np.tile(stiffness(*material), (len(state.stress), 1, 1))
+@elastic_tangent.register(Elastic)
+def isotropic_tangent(material: Any, state: Any) -> Array:
+    """Return the (n, 6, 6) tangent of any material with a Young's modulus and a Poisson's ratio."""
+    return np.tile(stiffness(material.youngs_modulus, material.poisson_ratio), (len(state.stress), 1, 1))

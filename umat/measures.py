@@ -156,13 +156,3 @@ def second_order_work(stress: ArrayLike, strain: ArrayLike) -> Array:
     return dot(
         np.diff(stress, axis=0, prepend=np.asarray(stress)[:1]), np.diff(strain, axis=0, prepend=np.asarray(strain)[:1])
     )
-
-
-def instability_fit(state: ArrayLike, fabric: bool = False) -> Array:
-    """Return the stress ratio at instability by the fits of [K §3.5]: to ψ, or with `fabric` to ζ."""
-    return 0.536 * np.exp(-11.88 * np.asarray(state)) if fabric else 0.4526 * np.exp(-12.57 * np.asarray(state))
-
-
-def transformation_fit(state: ArrayLike, fabric: bool = False) -> Array:
-    """Return the stress ratio at phase transformation or characteristic state by [K §3.5]: to ψ, or to ζ."""
-    return 0.7703 * np.exp(-2.486 * np.asarray(state)) if fabric else 0.782 * np.exp(-1.977 * np.asarray(state))

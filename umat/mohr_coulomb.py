@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from umat.elastic import Elastic, check, check_moduli, stiffness
+from umat.elastic import check, check_moduli, isotropic_tangent, stiffness
 from umat.interface import (
     Response,
     elastic_tangent,
@@ -75,10 +75,7 @@ def _(material: MohrCoulomb, state: PlasticState) -> dict[str, Array]:
     return {"plastic_strain": state.plastic_strain, "mobilised_strength": mobilised}
 
 
-@elastic_tangent.register
-def _(material: MohrCoulomb, state: PlasticState) -> Array:
-    elastic = Elastic(material.youngs_modulus, material.poisson_ratio)
-    return elastic_tangent(elastic, state)
+elastic_tangent.register(MohrCoulomb, isotropic_tangent)
 
 
 @weakened.register

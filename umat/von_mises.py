@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from umat.cone import Cone, return_slice
-from umat.elastic import Elastic, bulk_modulus, check, check_moduli, shear_modulus
+from umat.elastic import bulk_modulus, check, check_moduli, isotropic_tangent, shear_modulus
 from umat.interface import (
     Response,
     elastic_tangent,
@@ -68,10 +68,7 @@ def _(material: VonMises, state: PlasticState) -> dict[str, Array]:
     }
 
 
-@elastic_tangent.register
-def _(material: VonMises, state: PlasticState) -> Array:
-    elastic = Elastic(material.youngs_modulus, material.poisson_ratio)
-    return elastic_tangent(elastic, state)
+elastic_tangent.register(VonMises, isotropic_tangent)
 
 
 @weakened.register
