@@ -1,6 +1,6 @@
 """The fields of an increment as they are stored: smoothed at nodes, raw means in cells, tensors in VTK's order."""
 
-from fabfem.boundary_value.errors import FIELD
+from fabfem.boundary_value.discretisation import FIELD
 from fabfem.boundary_value.fields import AT_NODES, PORE_PRESSURE, point_fields
 from fabfem.boundary_value.problem import Problem
 from fabfem.boundary_value.water import nodal_pore_pressure, point_pore_pressure

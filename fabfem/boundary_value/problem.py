@@ -8,11 +8,10 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 
-import numpy as np
-
 import umat
 from fabfem.boundary_value.conditioning import conditioning_columns
-from fabfem.boundary_value.errors import FIELD, Discretisation, error_columns
+from fabfem.boundary_value.discretisation import FIELD, Discretisation
+from fabfem.boundary_value.errors import error_columns
 from fabfem.boundary_value.fields import known_fields, point_tensors
 from fabfem.boundary_value.ground import ground_stress, zones_of
 from fabfem.boundary_value.hollow_cylinder import hollow_cylinder_columns
@@ -34,6 +33,7 @@ from fabfem.fem.stages import Stage
 from fabfem.fem.systems import absent_dofs
 from fabfem.parallel.world import communicator, share_cores, shared
 from fabfem.substance import MisfitError, Substance, Surroundings, substance
+from umat.mandel import IDENTITY
 
 
 @dataclass(frozen=True)
@@ -181,9 +181,7 @@ def _spare(substances: Mapping[str, Substance], zones: Mapping[str, Zone]) -> It
     used = [zone.material for zone in zones.values()]
     for name, spare in substances.items():
         if spare.material not in used:
-            state = umat.initial_state(
-                spare.material, spare.directions, np.eye(1, 6) + np.eye(1, 6, 1) + np.eye(1, 6, 2), **spare.needs
-            )
+            state = umat.initial_state(spare.material, spare.directions, IDENTITY[None], **spare.needs)
             yield f"[{name}]", Zone(spare.material, spare.directions, state, slice(0, 0))
 
 

@@ -5,10 +5,9 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from fabfem.boundary_value.audit import audit, audited
-from fabfem.boundary_value.fields import QUANTITIES
+from fabfem.boundary_value.entries import entry, head, refused, worst
 from fabfem.boundary_value.frame import frame
 from fabfem.boundary_value.meshes import mesh_file
-from fabfem.boundary_value.omitted import remaining
 from fabfem.boundary_value.peaks import Peaks
 from fabfem.boundary_value.probes import Column
 from fabfem.boundary_value.problem import Problem
@@ -19,12 +18,11 @@ from fabfem.failures import clear as clear_failures
 from fabfem.failures import keep_points, keep_stage
 from fabfem.fem.increment import Collapsed, Cutback, Increment, Stopped
 from fabfem.fem.share import share_of
-from fabfem.fem.space import Space
 from fabfem.fem.start import Start
 from fabfem.output.checkpoints import PATTERN as CHECKPOINTS
 from fabfem.output.checkpoints import SHARES, Checkpoint, Checkpoints
 from fabfem.output.history import History, Unheard
-from fabfem.output.report import Report, about
+from fabfem.output.report import Report
 from fabfem.output.view import write_view
 from fabfem.output.vtu import FieldFiles, FieldPieces, Frame
 from fabfem.timing import Timer
@@ -77,7 +75,7 @@ class Recorder:
         self.history = History(folder / "history.csv", headers, then.history) if self._first else Unheard(headers)
         if self._first:
             _clear(folder, [name for _, name in then.fields], bool(written))
-        self.report = Report(folder / "report.json" if self._first else None, **_head(problem))
+        self.report = Report(folder / "report.json" if self._first else None, **head(problem))
         self._standing = set(self.report.content) - GATHERED
         self.report.content |= then.report
         self.fields = _field_files(problem, folder, then.fields)
@@ -105,11 +103,11 @@ class Recorder:
             output = self.problem.case.output
             if output and (increment.number % output.every == 0 or increment.fraction >= 1.0):
                 self._store()
-            self.report.add(_entry(increment), map(_refused, increment.cutbacks))
+            self.report.add(entry(increment), map(refused, increment.cutbacks))
             self._peaks.add(increment, self.row)
             self.report.content["peaks"] = self._peaks.content()
             if increment.worst_error > 0.0:
-                self.report.worst(_place(self.problem, increment))
+                self.report.worst(worst(self.problem, increment))
             if audited(self.problem, increment):
                 self.report.content["audit"] = audit(self.problem, increment)
             if output and "acoustic_determinant" in output.fields and "localisation" not in self.report.content:
@@ -126,7 +124,7 @@ class Recorder:
             self._keep()
             self._store()
             self.report.content["factor_of_safety"] = safety(end)
-            self.report.content["cutbacks"].extend(map(_refused, end.cutbacks))
+            self.report.content["cutbacks"].extend(map(refused, end.cutbacks))
             if self._first:
                 write_curve(self.folder / "strength_reduction.csv", end, self.problem.case.units.length)
             if self.fields and end.failing and self.problem.case.output:
@@ -146,7 +144,7 @@ class Recorder:
         """Store the last increment and a checkpoint, say how the run ended, close, and return status and reason."""
         self._keep()
         self._store()
-        self.report.content["cutbacks"].extend(map(_refused, cutbacks))
+        self.report.content["cutbacks"].extend(map(refused, cutbacks))
         self.report.end(status, reason)
         self._write_report()
         self.history.close()
@@ -196,49 +194,6 @@ def recall(columns: Sequence[Column], keepers: Mapping[str, Any]) -> None:
     for column in columns if keepers else ():
         if column.keeper:
             column.keeper.recall(keepers[column.name])
-
-
-def _refused(cutback: Cutback) -> dict[str, Any]:
-    """Return what a report keeps of a cut-back."""
-    return {name: getattr(cutback, name) for name in ("stage", "fraction", "size", "reason", "point")}
-
-
-def _head(problem: Problem) -> dict[str, Any]:
-    """Return what a report says before anything has run."""
-    case, units = problem.case, problem.case.unit_system
-    kinds = ("probe", "reaction", "derived", "error")
-    fields = case.output.fields if case.output else ()
-    return {
-        **about(case),
-        "columns": {kind: [column.header for column in problem.columns if column.kind == kind] for kind in kinds},
-        "fields": {name: units.label(QUANTITIES.get(name, "none")) for name in fields},
-        "scene": dict(remaining(problem.model)),
-        "omitted": list(problem.omitted),
-        "resolved_case": case.model_dump(mode="json", exclude_none=True),
-    }
-
-
-def _entry(increment: Increment) -> dict[str, Any]:
-    """Return what a report keeps of an increment."""
-    kept = ("stage", "number", "fraction", "size", "time", "iterations", "residuals", "out_of_balance")
-    found = {name: getattr(increment, name) for name in (*kept, "drag", "held", "moved", "strength", "load_factor")}
-    return found | {"cutbacks": len(increment.cutbacks)}
-
-
-def _place(problem: Problem, increment: Increment) -> dict[str, Any]:
-    """Return the point of an increment with the largest local error, and where it is."""
-    return {
-        "point": increment.worst_point,
-        "error": increment.worst_error,
-        "at": place_of(problem.model.space, increment.worst_point),
-        "stage": increment.stage,
-        "increment": increment.number,
-    }
-
-
-def place_of(space: Space, point: int) -> list[float]:
-    """Return where a point of the whole mesh is."""
-    return space.mesh.ranks.places(space.points, [point], space.nq)[0].tolist()
 
 
 def _field_files(problem: Problem, folder: Path, stored: Sequence[tuple[float, str]]) -> FieldFiles | None:

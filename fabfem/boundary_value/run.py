@@ -6,12 +6,13 @@ from pathlib import Path
 from typing import Any
 
 from fabfem.boundary_value.audit import audited
+from fabfem.boundary_value.entries import place_of
 from fabfem.boundary_value.meshes import hash_of
 from fabfem.boundary_value.omitted import memory, remaining
 from fabfem.boundary_value.price import price, stored
 from fabfem.boundary_value.price import remember as remember_run
 from fabfem.boundary_value.problem import Problem, build
-from fabfem.boundary_value.record import PHASES, Recorder, Written, place_of, recall
+from fabfem.boundary_value.record import PHASES, Recorder, Written, recall
 from fabfem.boundary_value.safety import sentence
 from fabfem.boundary_value.shares import blame, dealt
 from fabfem.case import BoundaryValueCase, CaseError
