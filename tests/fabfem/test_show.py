@@ -35,6 +35,20 @@ def test_pictures_are_drawn(copied: Path) -> None:
     assert _colours(copied / "shear_strain.png") > 20
 
 
+@pytest.mark.parametrize(
+    ("low", "high", "first", "last"),
+    [(0.0, 0.143, 0.0, 0.16), (0.0, 97.3, 0.0, 100.0), (0.078, 0.542, 0.0, 0.6), (0.2022, 0.2023, 0.201, 0.207)],
+)
+def test_the_labels_of_colours_are_round_and_tell_values_apart(
+    low: float, high: float, first: float, last: float
+) -> None:
+    draw = pytest.importorskip("fabfem.pictures.draw")
+    found = draw.span(low, high)
+    assert found == pytest.approx((first, last))
+    labels = [f"{value:.4g}" for value in np.linspace(*found, draw.LABELS + 1)]
+    assert len(set(labels)) == draw.LABELS + 1
+
+
 def test_a_death_of_vtk_becomes_a_sentence_and_the_curve_is_drawn(
     copied: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
