@@ -48,7 +48,7 @@ class Drawn(NamedTuple):
 def draw(folder: Path) -> list[Path]:
     """Draw the pictures that the last stored increment has fields for, and return their files."""
     grid = _last(folder)
-    deformed = grid.warp_by_vector("displacement") if "displacement" in grid.point_data else grid
+    deformed = moved_to(grid) if "displacement" in grid.point_data else grid
     plotter, title = _plotter(), _title(folder)
     pictures = [_shoot(_shear(plotter, deformed), title, folder / "shear_strain.png")]
     if {"displacement_increment", "strain_increment"} <= set(grid.point_data.keys()):
@@ -66,6 +66,16 @@ def _last(folder: Path) -> pyvista.UnstructuredGrid:
     reader = pyvista.get_reader(folder / "fields.pvd")
     reader.set_active_time_point(reader.number_time_points - 1)
     return reader.read()[0]
+
+
+def moved_to(grid: pyvista.UnstructuredGrid) -> pyvista.UnstructuredGrid:
+    """Return the grid where it has moved to; of a section through a twisted body, only what it moves in its plane."""
+    moved = np.array(grid.point_data["displacement"])
+    if not grid_is_solid(grid):
+        moved[:, 2] = 0.0
+    found = grid.copy()
+    found.points = grid.points + moved
+    return found
 
 
 def _shear(plotter: pyvista.Plotter, grid: pyvista.UnstructuredGrid) -> "Drawn":
@@ -143,9 +153,8 @@ def _fabric(plotter: pyvista.Plotter, grid: pyvista.UnstructuredGrid) -> "Drawn"
     """Draw the density of contacts as ellipsoids, long where contact normals gather."""
     bounds = busy(grid, max(float(np.nanpercentile(grid["shear"], SATURATED)), 1e-12))
     outline = _cropped(grid.extract_surface(nonlinear_subdivision=2, algorithm="dataset_surface"), bounds)
-    edge = outline.extract_surface(algorithm="dataset_surface").extract_feature_edges(
-        manifold_edges=False, feature_edges=False
-    )
+    whole = outline.extract_surface(algorithm="dataset_surface").clean(tolerance=1e-6)  # cropping parts the elements
+    edge = whole.extract_feature_edges(manifold_edges=False, feature_edges=False)
     plotter.add_mesh(outline, color="#f4f1ea", lighting=False)
     plotter.add_mesh(edge, color=INK, line_width=2)
     glyphs = pyvista.merge(list(_glyphs(grid, bounds)))
