@@ -24,6 +24,14 @@ SATURATED = 96.0
 """Percentile of the shear strain at which the colours end; the corners of a footing strain without bound."""
 GLYPHS_ACROSS = 24
 """Fabric glyphs across the picture."""
+UNIFORM = 0.02
+"""Least span of a colour bar over its largest value: what varies less has about one colour."""
+LABELS = 4
+"""Intervals between the labels of a colour bar."""
+ROUND = np.array([1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 15.0, 20.0])
+"""Numbers whose multiples are easily read."""
+FINE = 15_000
+"""Elements from which their edges would hide what they lie in."""
 STRETCH = 1.5
 """Exaggeration of the anisotropy of a fabric glyph."""
 
@@ -40,7 +48,7 @@ class Drawn(NamedTuple):
 def draw(folder: Path) -> list[Path]:
     """Draw the pictures that the last stored increment has fields for, and return their files."""
     grid = _last(folder)
-    deformed = grid.warp_by_vector("displacement") if "displacement" in grid.point_data else grid
+    deformed = moved_to(grid) if "displacement" in grid.point_data else grid
     plotter, title = _plotter(), _title(folder)
     pictures = [_shoot(_shear(plotter, deformed), title, folder / "shear_strain.png")]
     if {"displacement_increment", "strain_increment"} <= set(grid.point_data.keys()):
@@ -60,6 +68,16 @@ def _last(folder: Path) -> pyvista.UnstructuredGrid:
     return reader.read()[0]
 
 
+def moved_to(grid: pyvista.UnstructuredGrid) -> pyvista.UnstructuredGrid:
+    """Return the grid where it has moved to; of a section through a twisted body, only what it moves in its plane."""
+    moved = np.array(grid.point_data["displacement"])
+    if not grid_is_solid(grid):
+        moved[:, 2] = 0.0
+    found = grid.copy()
+    found.points = grid.points + moved
+    return found
+
+
 def _shear(plotter: pyvista.Plotter, grid: pyvista.UnstructuredGrid) -> "Drawn":
     """Draw the deformed mesh, coloured by shear strain where strain was stored, else by displacement."""
     if "strain" in grid.point_data:
@@ -70,11 +88,11 @@ def _shear(plotter: pyvista.Plotter, grid: pyvista.UnstructuredGrid) -> "Drawn":
     upper = max(float(np.nanpercentile(grid["shear"], SATURATED)), 1e-12)
     bounds = busy(grid, upper)
     surface = _cropped(grid.extract_surface(nonlinear_subdivision=2, algorithm="dataset_surface"), bounds)
-    edges = _cropped(grid.linear_copy().extract_all_edges(), bounds)
-    plotter.add_mesh(
-        surface, scalars="shear", cmap="OrRd", clim=(0.0, upper), scalar_bar_args=_bar(title), lighting=False
-    )
-    plotter.add_mesh(edges, color=INK, line_width=1, opacity=0.3)
+    colours = span(0.0, upper)
+    plotter.add_mesh(surface, scalars="shear", cmap="OrRd", clim=colours, scalar_bar_args=_bar(title), lighting=False)
+    if grid.n_cells < FINE:
+        edges = _cropped(grid.linear_copy().extract_all_edges(), bounds)
+        plotter.add_mesh(edges, color=INK, line_width=1, opacity=0.3)
     return Drawn(plotter, bounds)
 
 
@@ -135,9 +153,8 @@ def _fabric(plotter: pyvista.Plotter, grid: pyvista.UnstructuredGrid) -> "Drawn"
     """Draw the density of contacts as ellipsoids, long where contact normals gather."""
     bounds = busy(grid, max(float(np.nanpercentile(grid["shear"], SATURATED)), 1e-12))
     outline = _cropped(grid.extract_surface(nonlinear_subdivision=2, algorithm="dataset_surface"), bounds)
-    edge = outline.extract_surface(algorithm="dataset_surface").extract_feature_edges(
-        manifold_edges=False, feature_edges=False
-    )
+    whole = outline.extract_surface(algorithm="dataset_surface").clean(tolerance=1e-6)  # cropping parts the elements
+    edge = whole.extract_feature_edges(manifold_edges=False, feature_edges=False)
     plotter.add_mesh(outline, color="#f4f1ea", lighting=False)
     plotter.add_mesh(edge, color=INK, line_width=2)
     glyphs = pyvista.merge(list(_glyphs(grid, bounds)))
@@ -145,6 +162,7 @@ def _fabric(plotter: pyvista.Plotter, grid: pyvista.UnstructuredGrid) -> "Drawn"
         glyphs,
         scalars="norm",
         cmap="viridis",
+        clim=span(glyphs["norm"].min(), glyphs["norm"].max()),
         scalar_bar_args=_bar("norm of the fabric anisotropy F; ellipses are long where contact normals point"),
         lighting=grid_is_solid(grid),
     )
@@ -177,6 +195,17 @@ def sampled(grid: pyvista.UnstructuredGrid, bounds: tuple[float, ...], spacing: 
     return lattice[inside][good], tensors(probed["fabric"][good])
 
 
+def span(low: float, high: float) -> tuple[float, float]:
+    """Return where the colours of values from low to high begin and end, so that all labels between are round."""
+    least = max(high - low, UNIFORM * max(abs(low), abs(high)), 1e-12) / LABELS
+    power = 10.0 ** np.floor(np.log10(least))
+    for step in power * ROUND:
+        first = step * np.floor(low / step * (1.0 + 1e-9))
+        if step >= least * (1.0 - 1e-9) and first + LABELS * step >= high * (1.0 - 1e-9):
+            break
+    return float(first), float(first + LABELS * step)
+
+
 def tensors(components: Array) -> Array:
     """Return (n, 3, 3) tensors of (n, 6) components in VTK's order XX YY ZZ XY YZ XZ."""
     return np.asarray(components, float)[:, [0, 3, 5, 3, 1, 4, 5, 4, 2]].reshape(-1, 3, 3)
@@ -206,7 +235,7 @@ def _bar(title: str) -> dict[str, object]:
         "color": INK,
         "title_font_size": 30,
         "label_font_size": 26,
-        "fmt": "%.3g",
+        "fmt": "%.4g",
         "position_x": 0.25,
         "position_y": 0.03,
         "width": 0.5,
@@ -217,7 +246,8 @@ def _bar(title: str) -> dict[str, object]:
 def _shoot(drawn: Drawn, title: str, picture: Path) -> Path:
     """Frame the scene between its title and the colour bar, and write the picture."""
     plotter, bounds = drawn
-    plotter.add_text(title, position=(0.02, 0.91), viewport=True, font_size=12, color=INK)
+    text = plotter.add_text(title, position=(0.02, 0.91), viewport=True, font_size=12, color=INK)
+    text.GetTextProperty().SetLineSpacing(1.25)
     if bounds[5] > bounds[4]:
         plotter.view_isometric()
         plotter.add_axes(color=INK)
