@@ -12,6 +12,8 @@ from .fabric import ZhaoKruyt
 
 #: ‖F‖ of a gravity deposit of Toyoura sand: F = diag(−.0849, −.0849, +.1698), large along the deposition axis [ZK 6]
 TOYOURA_FABRIC_NORM = 0.208
+#: Atmospheric pressure [Pa]
+ATMOSPHERE = 101.3e3
 
 
 def toyoura(newtons: float = 1e3, metres: float = 1.0) -> ChangHicher:
@@ -22,7 +24,19 @@ def toyoura(newtons: float = 1e3, metres: float = 1.0) -> ChangHicher:
     of Verdugo & Ishihara (1996) in the Sand Triaxial Test Database.
     """
     law = ZhaoKruyt(h=10.0, m=0.4, critical_fabric=0.48, critical_ratio=1.25, extension=0.75)
-    return _in_units(newtons, metres, 0.934, 0.019, 0.7, 4.5, 27.0, 0.5, 0.7, 0.005, law)
+    sand = ChangHicher(
+        e_ref=0.934,
+        critical_slope=0.019,
+        critical_exponent=0.7,
+        normal_stiffness=4.5,
+        friction_angle=27.0,
+        tangential_ratio=0.5,
+        plastic_ratio=0.7,
+        reference_force=0.005,
+        reference_pressure=ATMOSPHERE,
+        law=law,
+    )
+    return _in_units(sand, newtons, metres)
 
 
 def dem_yang_wu(newtons: float = 1e3, metres: float = 1.0) -> ChangHicher:
@@ -32,25 +46,27 @@ def dem_yang_wu(newtons: float = 1e3, metres: float = 1.0) -> ChangHicher:
     are Toyoura's, and so is f_ref.
     """
     law = ZhaoKruyt(h=10.0, m=0.4, critical_fabric=0.48, critical_ratio=1.25, extension=0.75)
-    return _in_units(newtons, metres, 0.862, 0.021, 0.7, 18.0, 25.0, 0.6, 0.5, 0.005, law)
-
-
-def _in_units(
-    newtons: float, metres: float, e_ref: float, slope: float, exponent: float, stiffness: float, angle: float,
-    tangential: float, plastic: float, force: float, law: ZhaoKruyt,
-) -> ChangHicher:  # fmt: skip
-    """Return the record, from stiffness in N/mm and force in N, in other units."""
-    return ChangHicher(
-        e_ref=e_ref,
-        critical_slope=slope,
-        critical_exponent=exponent,
-        normal_stiffness=stiffness * 1e3 * metres / newtons,
-        friction_angle=angle,
-        tangential_ratio=tangential,
-        plastic_ratio=plastic,
-        reference_force=force / newtons,
-        reference_pressure=101.3e3 * metres**2 / newtons,
+    sand = ChangHicher(
+        e_ref=0.862,
+        critical_slope=0.021,
+        critical_exponent=0.7,
+        normal_stiffness=18.0,
+        friction_angle=25.0,
+        tangential_ratio=0.6,
+        plastic_ratio=0.5,
+        reference_force=0.005,
+        reference_pressure=ATMOSPHERE,
         law=law,
+    )
+    return _in_units(sand, newtons, metres)
+
+
+def _in_units(sand: ChangHicher, newtons: float, metres: float) -> ChangHicher:
+    """Return a sand, whose contacts are in N/mm and N and whose pressure is in Pa, in other units."""
+    return sand._replace(
+        normal_stiffness=sand.normal_stiffness * 1e3 * metres / newtons,
+        reference_force=sand.reference_force / newtons,
+        reference_pressure=sand.reference_pressure * metres**2 / newtons,
     )
 
 
