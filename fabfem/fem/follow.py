@@ -27,7 +27,7 @@ from fabfem.fem.increment import Cutback, Increment, Place, Step, Stopped, advan
 from fabfem.fem.loads import Loading
 from fabfem.fem.newton import Solved, pushed, stiffness_of, worst_point
 from fabfem.fem.points import Refusal, elastic_tangents
-from fabfem.fem.trial import Equilibrium, System, Task, Trial, attempt
+from fabfem.fem.trial import Equilibrium, System, Task, Trial, attempt, viscous_tangent
 
 EXACT = 1e-8
 """Relative misfit of the further equation that is left."""
@@ -44,6 +44,22 @@ class Reached(NamedTuple):
     load_factor: float
     last: np.ndarray | None
     """Displacement of the last increment."""
+
+
+class Sought(NamedTuple):
+    """The increment that is looked for."""
+
+    system: System
+    load: Loading
+    equation: Control
+    reached: Reached
+    size: float
+    """Part of the stage that it goes further."""
+
+    def task(self, factor: float) -> Task:
+        """What it has to balance with a load factor."""
+        viscous = viscous_tangent(self.system, self.reached.now, self.size)
+        return Task(self.load.total(factor), factor * self.system.constraints.motion, viscous)
 
 
 class Progress(NamedTuple):
@@ -97,7 +113,7 @@ def _tried(
     while True:
         target = fraction + size if fraction + 1.001 * size < 1.0 else 1.0
         size = target - fraction
-        solved, factor = _solve(system, load, equation, reached, size)
+        solved, factor = _solve(Sought(system, load, equation, reached, size))
         forces = load.total(factor), load.on_soil(factor)
         if isinstance(solved.end, Trial):
             return Step(solved, target, size, *forces, cutbacks), factor
@@ -107,30 +123,24 @@ def _tried(
             return Step(solved, target, size, *forces, cutbacks), factor
 
 
-def _solve(system: System, load: Loading, equation: Control, reached: Reached, size: float) -> tuple[Solved, float]:
-    """The increment that goes a part `size` of the stage further, and the load factor at its end."""
-    first, factor = _predicted(system, load, equation, reached, size, reached.now.tangent, 0.0)
-    answer, at = _iterated(system, load, equation, reached, size, first, factor)
+def _solve(sought: Sought) -> tuple[Solved, float]:
+    """The increment that is sought, and the load factor at its end."""
+    reached = sought.reached
+    first, factor = _predicted(sought, reached.now.tangent, 0.0)
+    answer, at = _iterated(sought, first, factor)
     if isinstance(answer.end, Trial) or isinstance(first, Refusal):
         return answer, at
     for sense in (1.0, -1.0):
-        start, factor = _predicted(system, load, equation, reached, size, first.batch.tangent, sense)
-        other, at = _iterated(system, load, equation, reached, size, start, factor)
+        start, factor = _predicted(sought, first.batch.tangent, sense)
+        other, at = _iterated(sought, start, factor)
         if isinstance(other.end, Trial):
             return other, at
     return answer, reached.load_factor
 
 
-def _iterated(
-    system: System,
-    load: Loading,
-    equation: Control,
-    reached: Reached,
-    size: float,
-    trial: Trial | Refusal,
-    factor: float,
-) -> tuple[Solved, float]:
+def _iterated(sought: Sought, trial: Trial | Refusal, factor: float) -> tuple[Solved, float]:
     """Newton's corrections of a trial."""
+    system, _, equation, reached, size = sought
     residuals: list[float] = []
     iterations = 1
     while isinstance(trial, Trial):
@@ -142,7 +152,7 @@ def _iterated(
             reason = f"no equilibrium in {iterations} iterations (residual {trial.residual:.1e})"
             trial = Refusal(reason, worst_point(system, trial))
             break
-        trial, factor = _corrected(system, load, equation, reached, size, trial, factor)
+        trial, factor = _corrected(sought, trial, factor)
         iterations += 1
     if isinstance(trial, Trial) and reached.last is not None and _cosine(system, trial.step, reached.last) < BACK:
         trial = Refusal("the path runs back along the last increment")
@@ -154,16 +164,9 @@ def _cosine(system: System, step: np.ndarray, last: np.ndarray) -> float:
     return space.dot(step, last) / max(space.norm(step) * space.norm(last), 1e-300)
 
 
-def _predicted(
-    system: System,
-    load: Loading,
-    equation: Control,
-    reached: Reached,
-    size: float,
-    tangent: np.ndarray,
-    sense: float,
-) -> tuple[Trial | Refusal, float]:
+def _predicted(sought: Sought, tangent: np.ndarray, sense: float) -> tuple[Trial | Refusal, float]:
     """The first trial along a tangent, and its load factor."""
+    system, load, equation, reached, size = sought
     old = reached.now
     unbalanced = system.constraints.collect(load.total(reached.load_factor) - old.force)
     both = _directions(system, load, old, tangent, unbalanced)
@@ -174,19 +177,12 @@ def _predicted(
     if not np.isfinite(change):
         return Refusal("the load does not move what is controlled"), reached.load_factor
     factor = reached.load_factor + change
-    return attempt(system, old, _task(system, load, factor, old, size), at_rest + change * along), factor
+    return attempt(system, old, sought.task(factor), at_rest + change * along), factor
 
 
-def _corrected(
-    system: System,
-    load: Loading,
-    equation: Control,
-    reached: Reached,
-    size: float,
-    trial: Trial,
-    factor: float,
-) -> tuple[Trial | Refusal, float]:
+def _corrected(sought: Sought, trial: Trial, factor: float) -> tuple[Trial | Refusal, float]:
     """The trial of one correction, halved while the points refuse it or the residual rises too much."""
+    system, load, equation, reached, size = sought
     both = _directions(system, load, reached.now, trial.batch.tangent, trial.unbalanced)
     if isinstance(both, Refusal):
         return both, factor
@@ -200,8 +196,7 @@ def _corrected(
     new: Trial | Refusal = Refusal("")
     for _ in range(system.controls.backtracks + 1):
         at = factor + share * change
-        task = _task(system, load, at, reached.now, size)
-        new = attempt(system, reached.now, task, trial.step + share * (at_rest + change * along))
+        new = attempt(system, reached.now, sought.task(at), trial.step + share * (at_rest + change * along))
         if (
             isinstance(new, Trial)
             and new.norm < system.controls.rise * trial.norm + system.space.norm(trial.force) * 1e-3
@@ -236,10 +231,3 @@ def _both(
         if not answer.ok:
             return Refusal(answer.reason)
     return constraints.spread(answers[0].x), constraints.motion + constraints.spread(answers[1].x)
-
-
-def _task(system: System, load: Loading, factor: float, old: Equilibrium, size: float) -> Task:
-    eta, viscous = system.controls.viscosity, None
-    if eta > 0.0:
-        viscous = eta / size * elastic_tangents(system.space, system.zones, old.states)
-    return Task(load.total(factor), factor * system.constraints.motion, viscous)

@@ -96,14 +96,17 @@ class Trial(NamedTuple):
 
 def make_task(system: System, old: Equilibrium, load: np.ndarray, size: float) -> Task:
     """What an increment has to balance that takes a part `size` of the stage."""
-    eta, viscous = system.controls.viscosity, None
-    if eta > 0.0:
-        viscous = eta / size * elastic_tangents(system.space, system.zones, old.states)
-    motion = size * system.constraints.motion
+    motion, viscous = size * system.constraints.motion, viscous_tangent(system, old, size)
     if system.water is None:
         return Task(load, motion, viscous)
     _let_out(system, old, motion)
     return Task(load, motion, viscous, begun(system, old, size), system.water.matrix(size))
+
+
+def viscous_tangent(system: System, old: Equilibrium, size: float) -> np.ndarray | None:
+    """The (npoints, k, k) stress that viscosity makes of a strain in a part `size` of the stage; None without it."""
+    eta = system.controls.viscosity
+    return eta / size * elastic_tangents(system.space, system.zones, old.states) if eta > 0.0 else None
 
 
 def _let_out(system: System, old: Equilibrium, motion: np.ndarray) -> None:

@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from fabfem import open_result
 from fabfem.case import CaseError, case_from
 from fabfem.case.toml import write_toml
 from fabfem.cli import main
@@ -23,7 +24,6 @@ from fabfem.laboratory.plans import plan
 from fabfem.laboratory.run import describe
 from fabfem.laboratory.specimen import build
 from fabfem.laboratory.stages import End, path
-from fabfem.output.history import read_history
 from fabfem.pictures.show import show
 from fabfem.run import run_case
 from umat import mandel
@@ -57,13 +57,7 @@ def tables(material: dict, *stages: dict, **more: Any) -> dict:
 def run(folder: Path, *arguments: Any, **more: Any) -> tuple[dict[str, np.ndarray], dict]:
     """Return the columns of the history of a run and its report."""
     outcome = run_case(case_from(tables(*arguments, **more)), folder, quiet=True)
-    return history(outcome.folder), json.loads((folder / "report.json").read_text(encoding="utf-8"))
-
-
-def history(folder: Path) -> dict[str, np.ndarray]:
-    headers, rows = read_history(folder / "history.csv")
-    found = {header.split(" [")[0]: [row[k] for row in rows] for k, header in enumerate(headers)}
-    return {name: np.array(column, dtype=None if name == "stage" else float) for name, column in found.items()}
+    return open_result(outcome.folder).history, json.loads((folder / "report.json").read_text(encoding="utf-8"))
 
 
 SHEAR = {"drainage": "undrained", "increments": 8}
@@ -290,7 +284,7 @@ def test_static_liquefaction_after_instability(tmp_path: Path) -> None:
     assert stage["status"] == "liquefied"
     assert {"instability", "second_order_work_lost"} == set(stage["states"])
     instability = stage["states"]["instability"]
-    columns = history(tmp_path)
+    columns = open_result(tmp_path).history
     assert instability["q"] == pytest.approx(columns["q"].max(), rel=0.01)
     assert instability["psi"] == pytest.approx(1.05 - (0.934 - 0.019 * (instability["p"] / 101.3) ** 0.7), abs=1e-4)
 
