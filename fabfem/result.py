@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fabfem.case import Case, CaseError, case_from, read_case
-from fabfem.output.history import read_history
+from fabfem.output.history import name_and_unit, read_history
 from fabfem.output.vtu import frames_of
 from fabfem.restart import Restart
 from fabfem.run import run_case
@@ -71,12 +71,12 @@ class Result:
     @cached_property
     def history(self) -> dict[str, NDArray[Any]]:
         """Columns of ``history.csv`` by name, without units; one entry for each row, stages are texts."""
-        return {_name(header): column for header, column in self._columns.items()}
+        return {name_and_unit(header)[0]: column for header, column in self._columns.items()}
 
     @cached_property
     def units(self) -> dict[str, str]:
         """Unit of each column, ``-`` for pure numbers, empty for texts."""
-        return {_name(header): header[len(_name(header)) :].strip(" []") for header in self._columns}
+        return dict(map(name_and_unit, self._columns))
 
     @cached_property
     def _columns(self) -> dict[str, NDArray[Any]]:
@@ -172,10 +172,6 @@ def solve(
     if outcome.status == "unwritten":
         raise OSError(outcome.reason)
     return Result(where)
-
-
-def _name(header: str) -> str:
-    return header.rpartition(" [")[0] or header
 
 
 def _column(values: list[str]) -> NDArray[Any]:

@@ -73,6 +73,12 @@ class Unheard(History):
         """Close nothing."""
 
 
+def name_and_unit(header: str) -> tuple[str, str]:
+    """Return the name of a column and its unit, ``-`` for a pure number, empty for a text."""
+    name, _, unit = header.removesuffix("]").rpartition(" [")
+    return (name, unit) if name else (header, "")
+
+
 def number_of(text: str) -> float:
     """Return an entry of a table; NaN where it is none, or empty."""
     try:

@@ -18,7 +18,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from fabfem.case import CaseError, suggest
-from fabfem.output.history import number_of
+from fabfem.output.history import name_and_unit, number_of
 from fabfem.output.report import read_report
 
 STYLES = ("-", "--", ":", "-.", (0, (6, 1, 1, 1, 1, 1)), (0, (1, 3)))
@@ -48,7 +48,7 @@ def _read(path: Path) -> tuple[dict[tuple[str, str], dict[str, Any]], dict[str, 
     """Return columns (arrays, NaN where empty) by law and path, and the full header of each column."""
     with path.open(encoding="utf-8", newline="") as file:
         lines = list(csv.reader(file))
-    names = [header.split(" [")[0] for header in lines[0]]
+    names = [name_and_unit(header)[0] for header in lines[0]]
     groups: dict[tuple[str, str], list[list[str]]] = {}
     for line in lines[1:]:
         row = dict(zip(names, line, strict=False))

@@ -78,7 +78,7 @@ def moved_to(grid: pyvista.UnstructuredGrid) -> pyvista.UnstructuredGrid:
     return found
 
 
-def _shear(plotter: pyvista.Plotter, grid: pyvista.UnstructuredGrid) -> "Drawn":
+def _shear(plotter: pyvista.Plotter, grid: pyvista.UnstructuredGrid) -> Drawn:
     """Draw the deformed mesh, coloured by shear strain where strain was stored, else by displacement."""
     if "strain" in grid.point_data:
         grid["shear"], title = 100.0 * shear_strain(grid.point_data["strain"]), "shear strain [%]"
@@ -96,7 +96,7 @@ def _shear(plotter: pyvista.Plotter, grid: pyvista.UnstructuredGrid) -> "Drawn":
     return Drawn(plotter, bounds)
 
 
-def _mechanism(plotter: pyvista.Plotter, grid: pyvista.UnstructuredGrid) -> "Drawn":
+def _mechanism(plotter: pyvista.Plotter, grid: pyvista.UnstructuredGrid) -> Drawn:
     """Draw how the body moves in the last increment: arrows over the shear strain, both relative to the largest."""
     sheared = shear_strain(grid.point_data["strain_increment"])
     grid["shear"] = sheared / max(float(np.nanpercentile(sheared, SATURATED)), 1e-300)
@@ -149,7 +149,7 @@ def busy(grid: pyvista.UnstructuredGrid, upper: float) -> tuple[float, ...]:
     return tuple(np.stack([low, high], axis=1).ravel())
 
 
-def _fabric(plotter: pyvista.Plotter, grid: pyvista.UnstructuredGrid) -> "Drawn":
+def _fabric(plotter: pyvista.Plotter, grid: pyvista.UnstructuredGrid) -> Drawn:
     """Draw the density of contacts as ellipsoids, long where contact normals gather."""
     bounds = busy(grid, max(float(np.nanpercentile(grid["shear"], SATURATED)), 1e-12))
     outline = _cropped(grid.extract_surface(nonlinear_subdivision=2, algorithm="dataset_surface"), bounds)

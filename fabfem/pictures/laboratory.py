@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from fabfem.laboratory.plans import basis
-from fabfem.output.history import read_history
+from fabfem.output.history import name_and_unit, read_history
 from fabfem.output.report import read_report
 from umat.mandel import FACTOR
 
@@ -76,9 +76,9 @@ def draw(folder: Path) -> list[Path]:
 def read(folder: Path) -> Curves:
     """Return the columns of a history."""
     headers, rows = read_history(folder / "history.csv")
-    named = [header.rstrip("]").partition(" [") for header in headers]
-    table = {name: np.array([float(row[k]) for row in rows]) for k, (name, _, _) in enumerate(named) if k}
-    return Curves([row[0] for row in rows], table, {name: unit for name, _, unit in named})
+    named = [name_and_unit(header) for header in headers]
+    table = {name: np.array([float(row[k]) for row in rows]) for k, (name, _) in enumerate(named) if k}
+    return Curves([row[0] for row in rows], table, dict(named))
 
 
 def _curves(folder: Path, report: dict[str, Any]) -> Path | None:

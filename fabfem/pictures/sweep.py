@@ -20,7 +20,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from fabfem.case import CaseError, suggest
-from fabfem.output.history import number_of
+from fabfem.output.history import name_and_unit, number_of
 from fabfem.pictures import calibration
 from fabfem.pictures.curves import STYLES
 from fabfem.pictures.laboratory import LABELS
@@ -138,10 +138,8 @@ def read_rows(path: Path) -> tuple[list[dict[str, str]], dict[str, str]]:
     """Return the rows of a table by column, and the unit of each column."""
     with path.open(encoding="utf-8", newline="") as file:
         header, *rows = list(csv.reader(file))
-    named = [name.rstrip("]").partition(" [") for name in header]
-    return [dict(zip([name for name, _, _ in named], row, strict=True)) for row in rows], {
-        name: unit for name, _, unit in named
-    }
+    named = [name_and_unit(column) for column in header]
+    return [dict(zip([name for name, _ in named], row, strict=True)) for row in rows], dict(named)
 
 
 def _assigned(runs: Sequence[Run], name: str, choose: Any) -> dict[str, Any]:

@@ -14,15 +14,15 @@ import fabfem
 import umat
 from fabfem.case import Case, case_from
 from fabfem.output.atomic import write_atomic
-from fabfem.output.history import read_history
+from fabfem.output.history import name_and_unit, read_history
 from fabfem.run import describe_case
 from fabfem.study.processes import LEAST, Job, Pool
 from fabfem.study.variants import ABOUT_RUNS, Choice, Tables, variant
 from fabfem.study.worker import FINAL, Ran, Task
 
 ASIDE = (
-    *("__main__.py", "authoring.py", "case/json_schema.py", "case/study.py", "cli.py", "gallery.py"),
-    *("pictures", "result.py", "starters", "study"),
+    *("__main__.py", "case/json_schema.py", "case/study.py", "cli.py", "commands", "extremes", "gallery.py"),
+    *("pictures", "replay.py", "result.py", "starters", "study", "trace.py", "verification"),
 )
 """Parts of the package that decide no result of a run."""
 
@@ -43,12 +43,7 @@ class Run(NamedTuple):
         if not file.is_file() or self.ran.status not in ("completed", "stopped"):
             return {}
         headers, rows = read_history(file)
-        return {name_of(header): [row[i] for row in rows] for i, header in enumerate(headers)}
-
-
-def name_of(header: str) -> str:
-    """Return the name of a column without its unit."""
-    return header.rpartition(" [")[0] or header
+        return {name_and_unit(header)[0]: [row[i] for row in rows] for i, header in enumerate(headers)}
 
 
 class Plan(NamedTuple):

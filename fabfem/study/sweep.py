@@ -19,11 +19,11 @@ from fabfem.case import Case, CaseError, read_case, read_tables, suggest
 from fabfem.case.study import Sweep
 from fabfem.outcome import claimed
 from fabfem.output.atomic import write_atomic
-from fabfem.output.history import read_history
+from fabfem.output.history import name_and_unit, read_history
 from fabfem.study import compared, states
 from fabfem.study.processes import Pool, limits
 from fabfem.study.progress import shown, text
-from fabfem.study.store import Plan, Run, name_of, runs
+from fabfem.study.store import Plan, Run, runs
 from fabfem.study.variants import choices
 
 ABOUT = ("status", "reason", "wall_time [s]", "peak_memory [MiB]", "folder")
@@ -150,13 +150,13 @@ def _about(run: Run) -> list[Any]:
 
 def _beside(parameters: Sequence[str], header: str) -> str:
     """Return the header of a column of the histories, which a parameter of the same name leaves as NAME_history."""
-    name = name_of(header)
+    name, _ = name_and_unit(header)
     return f"{name}_history{header[len(name) :]}" if name in parameters else header
 
 
 def _header(name: str, headers: Sequence[str], case: str) -> str:
     """Return the header of a column that was asked for by its name."""
-    names = {name_of(header): header for header in headers}
+    names = {name_and_unit(header)[0]: header for header in headers}
     if headers and name not in names:
         raise CaseError(f"{case}: sweep.columns: no history has a column '{name}'{suggest(name, names)}")
     return names.get(name, name)

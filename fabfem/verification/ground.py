@@ -37,10 +37,16 @@ class Ground:
         return replace(mesh, boundaries=sides | named)
 
     def _ladder(self, length: float) -> np.ndarray:
-        """Return ascending coordinates from 0 to `length`."""
-        steps = int(np.ceil(np.log1p(length / self.fine * (self.growth - 1.0)) / np.log(self.growth)))
-        ladder = np.concatenate([[0.0], np.cumsum(self.growth ** np.arange(steps))])
-        return ladder * length / ladder[-1]
+        return ladder(length, self.fine, self.growth)
+
+
+def ladder(length: float, fine: float, growth: float) -> np.ndarray:
+    """Return ascending coordinates from 0 to `length`, at distances that grow from `fine` by the ratio `growth`."""
+    if length == 0.0:
+        return np.zeros(1)
+    steps = int(np.ceil(np.log1p(length / fine * (growth - 1.0)) / np.log(growth)))
+    rungs = np.concatenate([[0.0], np.cumsum(growth ** np.arange(steps))])
+    return rungs * length / rungs[-1]
 
 
 def footing(material: Tables, settlement: float, rough: bool, surcharge: float = 0.0, axial: bool = False) -> Tables:

@@ -11,6 +11,7 @@ import numpy as np
 from fabfem.fem.box import grid_mesh
 from fabfem.fem.facets import outer_facets
 from fabfem.fem.mesh import Mesh
+from fabfem.verification.ground import ladder
 from fabfem.verification.scene import Answer, Tables, held
 
 
@@ -62,12 +63,7 @@ class Slope:
         return np.stack([np.where(x <= 0.0, x * (length - back) / length - back, x), y], axis=1)
 
     def _ladder(self, length: float) -> np.ndarray:
-        """Ascending coordinates from 0 to `length`, cells growing from `fine`."""
-        if length == 0.0:
-            return np.zeros(1)
-        steps = int(np.ceil(np.log1p(length / self.fine * (self.growth - 1.0)) / np.log(self.growth)))
-        ladder = np.concatenate([[0.0], np.cumsum(self.growth ** np.arange(steps))])
-        return ladder * length / ladder[-1]
+        return ladder(length, self.fine, self.growth)
 
     def _even(self, length: float) -> np.ndarray:
         return np.linspace(0.0, length, int(np.ceil(length / self.fine)) + 1)

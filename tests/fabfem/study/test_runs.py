@@ -15,7 +15,7 @@ from fabfem.cli import main
 from fabfem.commands.status import BAD_INPUT, DONE, STOPPED
 from fabfem.study.certainty import blind_spots, certainty
 from fabfem.study.processes import Job, Limits, Pool, fits, limits
-from fabfem.study.store import run_key
+from fabfem.study.store import ASIDE, run_key
 from fabfem.study.variants import Setting, variant
 from fabfem.study.worker import Ran, Task
 
@@ -290,3 +290,8 @@ def test_a_bad_study_or_calibration_gets_a_sentence(said: str, sentence: str, tu
     with pytest.raises(CaseError) as caught:
         (calibrate if "[calibration]" in said else study)(tube, tmp_path / "out", quiet=True)
     assert sentence in str(caught.value)
+
+
+def test_every_source_that_decides_no_result_is_there() -> None:
+    package = Path(__file__).parents[3] / "fabfem"
+    assert [name for name in ASIDE if not (package / name).exists()] == []
