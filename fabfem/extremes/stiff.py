@@ -11,7 +11,7 @@ from fabfem.fem.mesh import Mesh
 from fabfem.verification import bearing_capacity, undrained_tube
 from fabfem.verification.cylinder import cylinder
 from fabfem.verification.ground import Ground, footing
-from fabfem.verification.ring import pressing, ring
+from fabfem.verification.ring import pressing, ring, ring_mesh
 from fabfem.verification.scene import Answer, Tables, held, solve, stage
 
 DECADES = tuple(10.0**k for k in range(17))
@@ -103,10 +103,7 @@ def _zoned(mesh: Mesh, soft: np.ndarray) -> Mesh:
 
 def _slice(aspect: float) -> Answer:
     """A ring 16 elements wide and one high."""
-    radii = np.linspace(1.0, 2.0, 17)
-    mesh = grid_mesh("quad", [radii, np.array([0.0, (radii[1] - radii[0]) / aspect])])
-    names = {"left": "inner", "right": "outer"}
-    mesh = replace(mesh, boundaries={names.get(name, name): facets for name, facets in mesh.boundaries.items()})
+    mesh = ring_mesh("quad", np.linspace(1.0, 2.0, 17), aspect)
     return solve(ring({"model": "elastic", "youngs_modulus": 1.0}, [pressing("inner", 1.0)]), mesh)
 
 

@@ -13,9 +13,9 @@ from fabfem.fem.mesh import Mesh
 from fabfem.verification.scene import Answer, Tables, held
 
 
-def ring_mesh(cell_type: str, radii: np.ndarray) -> Mesh:
-    """Return a ring of linear cells cut at ascending radii, one cell high."""
-    mesh = grid_mesh(cell_type, [radii, np.array([0.0, radii[1] - radii[0]])])
+def ring_mesh(cell_type: str, radii: np.ndarray, aspect: float = 1.0) -> Mesh:
+    """Return a ring of linear cells cut at ascending radii, one cell high, the first `aspect` times as wide as high."""
+    mesh = grid_mesh(cell_type, [radii, np.array([0.0, (radii[1] - radii[0]) / aspect])])
     names = {"left": "inner", "right": "outer"}
     return replace(mesh, boundaries={names.get(name, name): facets for name, facets in mesh.boundaries.items()})
 
