@@ -104,7 +104,7 @@ def test_the_readme_and_the_automatic_run_test_alike() -> None:
     assert command in script.replace(" --quiet '", " '")
 
 
-def test_top_level_folders() -> None:
+def test_top_level_folders_are_the_six() -> None:
     listed = subprocess.run(["git", "ls-files"], cwd=ROOT, capture_output=True, text=True, check=False)
     if listed.returncode != 0 or not listed.stdout:
         pytest.skip("not a git checkout")

@@ -146,7 +146,7 @@ def _without_absent(value: object) -> object:
         (Units(), "none", "-"),
     ],
 )
-def test_unit_labels(units: Units, quantity: str, label: str) -> None:
+def test_labels_of_derived_units_are_written_out(units: Units, quantity: str, label: str) -> None:
     assert units.label(quantity) == label
 
 

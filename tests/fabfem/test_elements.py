@@ -55,7 +55,7 @@ def test_no_mean_costs_nothing() -> None:
 
 
 @pytest.mark.parametrize(("cell_type", "sizes"), [("triangle", {2}), ("tetra", {6}), ("quad", {1}), ("tetra10", {1})])
-def test_patches_of_a_box(cell_type: str, sizes: set[int]) -> None:
+def test_patches_of_a_box_have_the_sizes_of_its_element(cell_type: str, sizes: set[int]) -> None:
     dim = ELEMENTS[cell_type].dim
     found = np.bincount(patches(box_mesh(cell_type, (4,) * dim, (0.0,) * dim, (1.0,) * dim)))
     assert set(found.tolist()) == sizes

@@ -25,7 +25,9 @@ SWEEPS = {
 
 
 @pytest.mark.parametrize(("found", "limit", "resolution", "broke"), SWEEPS.values(), ids=SWEEPS)
-def test_verdicts(found: list[Found], limit: bool, resolution: bool, broke: int) -> None:
+def test_an_extreme_is_green_that_holds_as_far_as_asked(
+    found: list[Found], limit: bool, resolution: bool, broke: int
+) -> None:
     for as_resolution, green in ((False, limit), (True, resolution)):
         made = sweep("what", "x", (1, 2, 3), lambda x: found[int(x) - 1], 0.1, 2, as_resolution)
         assert (made.green, made.broke) == (green, broke)
@@ -55,7 +57,7 @@ QUICK = {
 
 @pytest.mark.skipif(not COMPILED, reason="takes the compiler")
 @pytest.mark.parametrize(("run", "value", "tolerance"), QUICK.values(), ids=QUICK)
-def test_the_same_answer(run, value: float, tolerance: float) -> None:
+def test_mild_values_give_the_same_answer(run, value: float, tolerance: float) -> None:
     if run is agreement.solvers and find_spec("pypardiso") is None:
         pytest.skip("PARDISO is not installed")
     made = sweep("what", "x", (value,), run, tolerance, value)
@@ -68,7 +70,7 @@ def test_what_has_no_answer_is_refused_by_name() -> None:
     assert [row for row in found if not row.green] == []
 
 
-def test_the_command(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture) -> None:
+def test_the_command_counts_what_is_red(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture) -> None:
     def fake(name: str):
         yield sweep("held", "x", (1, 2), lambda x: Found(1.0, 1.0), 0.1, 2)
         yield sweep("broke", "x", (1, 2), lambda x: Found(x, 1.0), 0.1, 1)

@@ -88,7 +88,7 @@ def test_coordination_number_of_the_isobaric_test(tmp_path: Path) -> None:
     assert end["F_q"] == end["F_b"] == ""
 
 
-def test_critical_surfaces(tmp_path: Path) -> None:
+def test_critical_surfaces_have_the_extremes_of_their_sources(tmp_path: Path) -> None:
     """[Y §3]: M_ct = .62, M_Ft = .77; [ZK 7, 8]: the product of M and F_c does not depend on the Lode angle."""
     found = {one["law"]: one for one in run("critical_surfaces", tmp_path)}
     assert found["yuan"]["M_extension"] == pytest.approx(0.62, abs=2e-3)
@@ -100,7 +100,7 @@ def test_critical_surfaces(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(("name", "key", "value"), [("contacts_2d", "Delta", 0.228), ("contacts_3d", "F_norm", 0.208)])
-def test_contacts(name: str, key: str, value: float, tmp_path: Path) -> None:
+def test_drawn_contacts_have_the_statistics_of_their_density(name: str, key: str, value: float, tmp_path: Path) -> None:
     found = run(name, tmp_path)[-1]
     assert found["contacts"] == 100000
     error = found["Delta_error" if key == "Delta" else "error_norm"]

@@ -92,7 +92,7 @@ def test_an_interrupt_leaves_a_checkpoint_of_the_last_row(folder: Path) -> None:
     assert json.loads((out / "report.json").read_text())["status"] == "interrupted"
 
 
-def test_an_interrupted_element_test(tmp_path: Path) -> None:
+def test_an_interrupted_element_test_is_resumed_to_the_last_bit(tmp_path: Path) -> None:
     (tmp_path / "case.toml").write_text(ELEMENT, encoding="utf-8")
     run = begun(tmp_path / "case.toml", tmp_path / "out", 3, "--quiet")
     run.send_signal(signal.SIGINT)
@@ -198,7 +198,7 @@ def fill(disk: Path, but: int) -> None:
     (disk / "other").write_bytes(bytes(there.f_bavail * there.f_frsize - but))
 
 
-def test_a_full_disk(small_disk: Path, folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_full_disk_keeps_what_was_written(small_disk: Path, folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     case, out = short(folder), small_disk / "out"
     fill(small_disk, but=400_000)
     assert main(["solve", str(case), "--out", str(out), "--quiet"]) == STOPPED
@@ -263,7 +263,7 @@ def mesh_files() -> list[Path]:
 
 
 @pytest.mark.parametrize("file", mesh_files(), ids=lambda file: file.name)
-def test_a_mesh_cut_short(file: Path, tmp_path: Path) -> None:
+def test_a_mesh_cut_short_is_refused(file: Path, tmp_path: Path) -> None:
     """Wherever it is cut, within a line at the latest, it is refused, or it is the whole mesh."""
     from fabfem.fem.facets import MeshError
     from fabfem.fem.mesh_files import read_mesh

@@ -113,7 +113,7 @@ def test_unusable_meshes_are_refused(raw: meshio.Mesh, words: str) -> None:
         from_meshio(raw)
 
 
-def test_missing_and_unreadable_files(tmp_path: Path) -> None:
+def test_missing_and_unreadable_files_are_refused(tmp_path: Path) -> None:
     with pytest.raises(MeshError, match="no mesh file"):
         read_mesh(tmp_path / "none.msh")
     for name in ("bad.msh", "bad.xyz"):

@@ -60,7 +60,7 @@ ROLLERS = (Support("left", "x"), Support("right", "x"), Support("bottom", "y"))
 
 
 @pytest.mark.parametrize("solver", ["superlu", "auto"])
-def test_terzaghi(solver: str) -> None:
+def test_a_layer_consolidates_as_terzaghi_says(solver: str) -> None:
     """Degree of consolidation of a layer with one drained side."""
     space, stiff = column(20), oedometric(0.2)
     rate = MOBILITY * stiff
@@ -72,7 +72,7 @@ def test_terzaghi(solver: str) -> None:
     np.testing.assert_allclose(steps[0].displacement[space.nmotion :], 100.0, rtol=1e-9)
 
 
-def test_mandel() -> None:
+def test_a_slab_shows_the_pressure_of_mandel() -> None:
     """The pressure at the centre of a slab between rigid plates rises before it falls."""
     space = porous(build_space(box_mesh("quad8", (24, 1), (0, 0), (1.0, 0.1)), KINEMATICS["plane_strain"]))
     plate = RigidBody("top", ("y",), (0.0, 0.1), {"x": 0.0, "rotation": 0.0})
@@ -95,7 +95,7 @@ def quarter_disc(n: int) -> Mesh:
 
 
 @pytest.mark.parametrize("nu", CRYER)
-def test_cryer(nu: float) -> None:
+def test_a_sphere_shows_the_pressure_of_cryer(nu: float) -> None:
     """The pressure at the centre of a sphere under pressure rises above it (Mandel-Cryer effect)."""
     mesh = quarter_disc(10)
     skin = np.concatenate([mesh.boundary("top"), mesh.boundary("right")])
@@ -113,7 +113,7 @@ def test_cryer(nu: float) -> None:
 
 
 @pytest.mark.parametrize("ratio", [1e2, 1e4, np.inf])
-def test_undrained_cylinder(ratio: float) -> None:
+def test_an_undrained_tube_is_elastic_with_the_undrained_modulus(ratio: float) -> None:
     """A thick tube, undrained: Lamé's answer with the undrained modulus; no locking, no checkerboard."""
     a, b, inside, nu = 0.1, 0.2, 60.0, 0.2
     space = porous(build_space(box_mesh("quad8", (8, 4), (a, 0), (b, 0.1)), KINEMATICS["axisymmetric"]))

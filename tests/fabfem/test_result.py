@@ -81,7 +81,7 @@ def test_an_element_test_has_no_grid(tmp_path: Path) -> None:
         found.grid()
 
 
-def test_what_goes_wrong(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_goes_wrong_is_raised_with_a_sentence(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     with pytest.raises(fabfem.CaseError, match="there is no such file"):
         fabfem.solve(folder / "nothing.toml")
     with pytest.raises(CaseError, match="holds no result"):

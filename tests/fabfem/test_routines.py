@@ -95,7 +95,7 @@ def test_strength_of_a_routine_cannot_be_divided(scene: Path) -> None:
         case_from(tables, scene / "umat.toml")
 
 
-def test_check_umat(scene: Path, capsys: pytest.CaptureFixture) -> None:
+def test_check_umat_finds_what_is_bad(scene: Path, capsys: pytest.CaptureFixture) -> None:
     good = [str(scene / "mohr_coulomb.so"), "--state-variables", "1", "--properties", *PARAMETERS[1:-1].split(", ")]
     assert main(["check-umat", *good]) == DONE
     assert "DDSDDE is the derivative of STRESS" in capsys.readouterr().out

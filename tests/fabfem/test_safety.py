@@ -173,7 +173,7 @@ def test_a_body_that_fails_at_the_first_factor_has_no_equilibrium_to_show() -> N
 
 
 @pytest.mark.parametrize("factor", [0.5, 1.0, 2.0])
-def test_what_is_divided(factor: float) -> None:
+def test_what_a_material_calls_its_strength_is_divided(factor: float) -> None:
     soil = weakened(MohrCoulomb(1.0, 0.2, 3.0, 30.0, 20.0), factor)
     assert soil.cohesion == 3.0 / factor
     assert np.tan(np.radians(soil.friction_angle)) == pytest.approx(np.tan(np.radians(30.0)) / factor)

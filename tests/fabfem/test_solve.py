@@ -155,7 +155,7 @@ def test_increments_grow_where_it_is_easy_and_halve_where_not() -> None:
     assert sum(sizes) == pytest.approx(1.0)
 
 
-def test_records_of_an_increment() -> None:
+def test_an_increment_records_time_number_and_balanced_forces() -> None:
     model = common_footing(0.4)
     steps = run(model)
     assert [step.number for step in steps] == list(range(1, 11))
@@ -257,7 +257,7 @@ def test_impossible_supports_are_refused(supports: tuple[Support, ...], words: s
         march(Model(space, filled(space, ELASTIC), (Stage("free", supports),)))
 
 
-def test_other_impossible_arguments() -> None:
+def test_impossible_arguments_are_refused() -> None:
     mesh = box_mesh("quad8", (2, 2), (0, 0), (1, 1))
     space = build_space(mesh, KINEMATICS["plane_strain"])
     state = initial_state(ELASTIC, None, np.zeros((4, 6)))

@@ -108,7 +108,7 @@ def test_an_editor_finds_the_schema(tmp_path: Path) -> None:
     assert subprocess.run(["taplo", "lint", "element.toml"], cwd=tmp_path, check=False).returncode != 0
 
 
-def test_a_routine_in_short(tmp_path: Path) -> None:
+def test_a_routine_in_short_says_the_same(tmp_path: Path) -> None:
     """``umat = LIBRARY`` says the same as ``model = "umat"`` and ``library``."""
     long = {"model": "umat", "library": "lib.so", "properties": [1.0, 0.3]}
     short = {"umat": "lib.so", "properties": [1.0, 0.3]}

@@ -37,7 +37,7 @@ def layer(**changes: Any) -> dict[str, Any]:
     return tables | changes
 
 
-def test_ground_water_and_consolidation() -> None:
+def test_ground_water_is_hydrostatic_until_a_fill_is_consolidated() -> None:
     problem = build(case_from(layer()))
     steps = [step for step in march(problem.model) if isinstance(step, Increment)]
     ground, fill, last = steps[0], next(s for s in steps if s.stage == "fill" and s.fraction == 1.0), steps[-1]
@@ -75,7 +75,7 @@ def test_ground_above_and_below_the_table() -> None:
         ({"probe": [{"name": "u", "kind": "pore_pressure", "component": "x", "point": [0.0, 0.0]}]}, "component"),
     ],
 )
-def test_refusals(changes: dict[str, Any], sentence: str) -> None:
+def test_impossible_water_is_refused(changes: dict[str, Any], sentence: str) -> None:
     with pytest.raises(CaseError, match=sentence):
         build(case_from(layer(**changes)))
 

@@ -171,7 +171,7 @@ def test_units_do_not_matter(regimes, newtons, metres):
 # --- state -----------------------------------------------------------------------------------------------------------
 
 
-def test_memory_of_a_point(regimes):
+def test_a_point_keeps_few_numbers(regimes):
     """At most one double for each direction and 40 more in the total form; three more for each in the rate form."""
     doubles = sum(array[0].size for array in regimes.state)
     n = len(regimes.directions)
@@ -179,7 +179,7 @@ def test_memory_of_a_point(regimes):
     assert all(array.dtype == np.float64 and array.flags.c_contiguous for array in regimes.updated().state)
 
 
-def test_fields_of_a_state(regimes):
+def test_fields_are_those_of_the_definitions(regimes):
     state = regimes.updated().state
     fields = umat.state_fields(regimes.material, state)
     p = mandel.p(state.stress) / 101.3

@@ -89,14 +89,14 @@ def test_gap_may_be_as_wide_as_it_will(material, isotropic_start, rule):
     assert np.isfinite(umat.elastic_tangent(material, again.state)).all()
 
 
-def test_bound_on_the_work(material, isotropic_start, rule):
+def test_no_point_works_beyond_its_bound(material, isotropic_start, rule):
     limited = material._replace(max_evaluations=5)
     old = isotropic_start(limited, n=2)
     refused(limited, rule, 5e-3 * SHEAR, old, status.WORK_LIMIT)
     assert umat.update(limited, rule, 5e-3 * SHEAR[None].repeat(2, 0), old).work.max() == 5
 
 
-def test_starts_that_cannot_be(material, isotropic_start, rule):
+def test_impossible_starts_are_refused(material, isotropic_start, rule):
     with pytest.raises(ValueError, match="density of contacts"):
         isotropic_start(material, fabric=[-1.2, 0.6, 0.6, 0.0, 0.0, 0.0])
     with pytest.raises(ValueError, match="void ratio must lie between"):
@@ -121,7 +121,7 @@ def test_the_least_pressure_at_the_start_does_not_depend_on_the_increment(materi
 
 
 @pytest.mark.parametrize("name", ["normal_stiffness", "friction_angle", "reference_pressure", "tolerance"])
-def test_parameters_that_cannot_be(isotropic_start, name):
+def test_impossible_parameters_are_refused(isotropic_start, name):
     with pytest.raises(ValueError, match=name):
         isotropic_start(toyoura()._replace(**{name: 0.0}))
     with pytest.raises(ValueError, match="localisation"):

@@ -68,7 +68,7 @@ def test_components_are_where_abaqus_has_them(component: int) -> None:
 
 
 @pytest.mark.parametrize("components", [6, 4])
-def test_elastic_fortran(library, components: int) -> None:
+def test_an_elastic_routine_in_fortran_answers_as_our_material(library, components: int) -> None:
     material = External(library("elastic.f"), STIFFNESS, 1, components=components)
     theirs, ours = both(material, ELASTIC, increments(components))
     np.testing.assert_allclose(theirs.stress, ours.stress, rtol=1e-12, atol=1e-11)
@@ -81,7 +81,9 @@ def test_elastic_fortran(library, components: int) -> None:
 
 @pytest.mark.parametrize("components", [6, 4])
 @pytest.mark.parametrize("parameters", MOHR_COULOMB.values(), ids=MOHR_COULOMB)
-def test_mohr_coulomb_c(library, parameters: tuple[float, ...], components: int) -> None:
+def test_a_mohr_coulomb_routine_in_c_answers_as_our_material(
+    library, parameters: tuple[float, ...], components: int
+) -> None:
     material = External(library("mohr_coulomb.c"), parameters, 1, components=components)
     theirs, ours = both(material, umat.MohrCoulomb(*parameters), increments(components))
     assert 0.1 * N < theirs.state.variables.sum() < 0.9 * N, "some points must yield, and some not"
@@ -141,7 +143,7 @@ def test_threads_give_the_same(library) -> None:
     np.testing.assert_array_equal(answers[0].stress, answers[1].stress)
 
 
-def test_sentences(library, tmp_path: Path) -> None:
+def test_what_cannot_be_loaded_gets_a_sentence(library, tmp_path: Path) -> None:
     text = tmp_path / "text.so"
     text.write_text("no library")
     for material, sentence in (

@@ -450,7 +450,7 @@ def test_uniform_strain_turns_unit_normals():
 # --- single laws -------------------------------------------------------------------------------------------------
 
 
-def test_shapes_of_yuan():
+def test_shapes_of_yuan_are_those_of_the_source():
     """[Y §3]: l1 = .795, M_ct = .62, l2 = M_Ft/M_Fc; h = 1 in compression (θ_l = −30°), l in extension (+30°)."""
     l1, l2, l3 = shapes(Yuan())
     assert l1 == pytest.approx(0.795, abs=2e-3)

@@ -59,7 +59,7 @@ def test_von_mises_fabric_by_components():
 
 
 @pytest.mark.parametrize("c", [0.6, 0.75, 0.9])
-def test_shape_function(c):
+def test_shape_function_is_as_printed(c):
     """[K 24] as printed, y = sin 3θ = −cos 3θ here; 1 in compression, c in extension."""
     y = np.array([-0.9, -0.4, 0.3, 0.8])
     printed = (np.sqrt((1 + c * c) ** 2 + 4 * c * (1 - c * c) * y) - (1 + c * c)) / (2 * (1 - c) * y)
@@ -77,7 +77,7 @@ def test_loading_direction_is_the_gradient():
         np.testing.assert_allclose(measures.loading_direction(s, 1.0), measures.direction(s), atol=1e-12)
 
 
-def test_dilatancy_state():
+def test_dilatancy_state_falls_with_the_anisotropy_of_a_dense_sand():
     """ζ = ψ at A = A_c and where e is above e_lim; a vertical deposit sheared along it is denser in ζ."""
     assert measures.dilatancy_state(0.8, 0.9, 0.48, 0.934, 0.1, 0.48) == pytest.approx(-0.1)
     assert measures.dilatancy_state(0.95, 0.9, 0.1, 0.934, 0.1, 0.48) == pytest.approx(0.05)
@@ -86,7 +86,7 @@ def test_dilatancy_state():
     assert across - along == pytest.approx(0.1 * (0.134 / 0.034) * 0.4 / 0.48)
 
 
-def test_initial_fabric():
+def test_initial_fabric_is_as_printed():
     assert measures.initial_fabric(0.5, 1.0) == 0.0
     assert measures.initial_fabric(0.46, 0.5) == pytest.approx(3 * 6**0.5 * -0.08 / (0.24 + 0.5 * -1.54))
 
@@ -129,7 +129,7 @@ def test_forces_of_contacts_are_linear_in_the_normal(localisation):
     assert (friction > 0.0).all()
 
 
-def test_density_of_contacts():
+def test_density_of_contacts_has_mean_one_and_the_moment_of_its_fabric():
     """The mean of 4π E is 1, and its second moment gives the fabric back, G = I/3 + 2F/15 [ZK 16]."""
     rule = directions("icosahedral_61")
     density = contacts.density(FABRICS, rule.normals)

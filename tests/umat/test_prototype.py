@@ -50,7 +50,7 @@ def computed() -> dict[str, np.ndarray]:
 
 
 @pytest.mark.parametrize("name", CURVES)
-def test_curve_of_the_prototype(name):
+def test_curves_are_those_of_the_prototype(name):
     ours, theirs = computed()[name], rows(name)
     assert len(theirs) == ROWS
     np.testing.assert_allclose(ours[:, 0], theirs[:, 0], rtol=1e-12)

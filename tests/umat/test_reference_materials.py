@@ -204,7 +204,7 @@ def test_bad_old_stress_is_refused_too(material):
 
 
 @every_material
-def test_objectivity(material):
+def test_a_turned_increment_gives_the_turned_answer(material):
     turn = mandel.rotation(Rotation.from_euler("zyx", [0.4, -1.1, 2.0]).as_matrix())
     old, increment = scattered(material), np.random.default_rng(2).normal(scale=1e-2, size=(40, 6))
     straight = umat.update(material, None, increment, old)
