@@ -119,6 +119,14 @@ def test_pictures_of_a_sweep_are_drawn_again_by_show(swept):
     assert all(picture.stat().st_size > 5000 for picture in pictures)
 
 
+@pytest.mark.parametrize(("file", "module"), [("study.json", "work_precision"), ("calibration.json", "calibration")])
+def test_show_draws_studies_and_calibrations_again(file, module, tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(f"fabfem.pictures.{module}.draw", lambda folder: folder / "drawn.png")
+    (tmp_path / file).write_text("{}", encoding="utf-8")
+    assert main(["show", str(tmp_path)]) == 0
+    assert capsys.readouterr().out == f"{tmp_path / 'drawn.png'}\n"
+
+
 def test_a_picture_ends_where_it_is_told(swept):
     from fabfem.pictures.sweep import _read, _runs
 
