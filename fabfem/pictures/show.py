@@ -30,6 +30,13 @@ GREEK = {"gamma": "γ", "tau": "τ", "eps": "ε", "sigma": "σ", "theta": "θ"}
 FACTOR = "strength_factor [-]"
 """What the strength of a slope is divided by."""
 
+MANY_RUNS = {
+    "sweep.json": "fabfem.pictures.sweep",
+    "study.json": "fabfem.pictures.work_precision",
+    "calibration.json": "fabfem.pictures.calibration",
+}
+"""Module that draws the pictures of many runs of a case, by the file that tells them; it has `draw(folder)`."""
+
 TIME_LIMIT = 600.0
 """Longest time that drawing the fields may take [s]."""
 
@@ -54,15 +61,17 @@ def show(folder: Path) -> Shown:
     Parameters
     ----------
     folder : Path
-        Folder that ``fabfem solve`` or ``fabfem sweep`` wrote.
+        Folder that ``fabfem solve``, ``sweep``, ``study`` or ``calibrate`` wrote.
 
     Raises
     ------
     CaseError
         If the folder holds no result.
     """
-    if (folder / "sweep.json").is_file():
-        return Shown(tuple(import_module("fabfem.pictures.sweep").draw(folder)), "")
+    for file, module in MANY_RUNS.items():
+        if (folder / file).is_file():
+            found = import_module(module).draw(folder)
+            return Shown((found,) if isinstance(found, Path) else tuple(found), "")
     if not (folder / "history.csv").is_file():
         raise CaseError(f"{folder}: holds no result (there is no history.csv)")
     drawer = DRAWERS.get(_kind(folder))
