@@ -73,10 +73,10 @@ def _saved(figure: Figure, folder: Path, about: Any, name: str) -> Path:
 
 def _usual(folder: Path, about: Any) -> Figure | None:
     """Return the figure of a sweep that asks for none, if its table has columns to draw."""
-    lines, units = _read(folder / "sweep.csv")
+    lines, units = read_rows(folder / "sweep.csv")
     names = list(units)
     columns = [name for name in names[len(about["parameters"]) + len(ABOUT) :] if name not in COUNTS]
-    columns = [name for name in columns if any(np.isfinite(_number(line[name])) for line in lines)]
+    columns = [name for name in columns if any(np.isfinite(number_of(line[name])) for line in lines)]
     if not columns or not lines:
         return None
     if len({tuple(line[name] for name in about["parameters"]) for line in lines}) == len(lines):
@@ -94,12 +94,12 @@ def _ends(
     groups: dict[str, list[dict[str, str]]] = {}
     for line in lines:
         groups.setdefault(", ".join(f"{name} = {_short(line[name])}" for name in others), []).append(line)
-    words = not all(np.isfinite(_number(line[across])) for line in lines)
+    words = not all(np.isfinite(number_of(line[across])) for line in lines)
     figure, axes = _figure(len(columns))
     for ax, column in zip(axes, columns, strict=False):
         for (label, rows), shade in zip(groups.items(), _shades(len(groups)), strict=True):
-            at = [_short(row[across]) if words else _number(row[across]) for row in rows]
-            ax.plot(at, [_number(row[column]) for row in rows], "o-", color=shade, markersize=4, label=label)
+            at = [_short(row[across]) if words else number_of(row[across]) for row in rows]
+            ax.plot(at, [number_of(row[column]) for row in rows], "o-", color=shade, markersize=4, label=label)
         _plain(ax, across, column, units, numbers=not words)
     if others:
         handles, labels = axes[0].get_legend_handles_labels()
