@@ -18,6 +18,7 @@ path that runs back along the last increment is refused.
 """
 
 from collections.abc import Generator
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -94,7 +95,8 @@ def through(
         easy = step.solved.iterations <= system.controls.easy and not step.cutbacks
         size = min(step.size * (system.controls.growth if easy else 1.0), stage.largest)
         at = Progress(factor, trial.step, fraction, size)
-        yield increment(place, number, system, old, reached.now, step, trial, timings, at, load_factor=factor)
+        there = place._replace(number=number, progress=at)
+        yield replace(increment(there, system, old, reached.now, step, trial, timings), load_factor=factor)
     return reached.now, number
 
 

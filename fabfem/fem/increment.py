@@ -186,25 +186,21 @@ def advanced(old: Equilibrium, trial: Trial) -> Equilibrium:
 
 def increment(
     place: Place,
-    number: int,
     system: System,
     old: Equilibrium,
     now: Equilibrium,
     step: Step,
     trial: Trial,
     timings: dict[str, float],
-    progress: Any,
-    strength: float | None = None,
-    load_factor: float | None = None,
 ) -> Increment:
-    """The record of an increment from `old` to `now`, after which the course has come to `progress`."""
+    """The record of an increment from `old` to `now`, after which the march has come to `place`."""
     force = begun(system, old, step.size)
     unbalanced = system.constraints.collect(step.load - force)
     start = float(np.sqrt(work(system, unbalanced, unbalanced)))
     return Increment(
         stage=place.stage.name,
         stage_index=place.stage_index,
-        number=number,
+        number=place.number,
         fraction=step.fraction,
         size=step.size,
         time=place.time + step.fraction * place.stage.duration,
@@ -227,8 +223,8 @@ def increment(
         step=trial.step,
         before=old.states,
         tangent=trial.batch.tangent,
-        resume=Start(place.stage.name, place.stage_index, number, place.time, now, place.origin, progress),
-        strength=place.stage.strength if strength is None else strength,
+        resume=Start(place.stage.name, place.stage_index, place.number, place.time, now, place.origin, place.progress),
+        strength=place.stage.strength,
         reused=step.solved.reused,
-        load_factor=step.fraction if load_factor is None else load_factor,
+        load_factor=step.fraction,
     )

@@ -10,6 +10,7 @@ Mises, tan φ_μ of Chang–Hicher, hence its tan φ_p = (e_c/e) tan φ_μ and t
 """
 
 from collections.abc import Generator, Mapping
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -112,7 +113,8 @@ def through(
             number += 1
             flowed = new.fluent is not None
             search = Search(bracket, start, enough, tried, flowed)
-            reached = _recorded(place, number, new, now, load, cutbacks, system.timer.since(spent), search)
+            there = place._replace(number=number, progress=search)
+            reached = _recorded(there, new, now, load, cutbacks, system.timer.since(spent))
             now, cutbacks, spent = _rest(new, now), (), dict(system.timer.spent)
             yield reached
         else:
@@ -120,7 +122,8 @@ def through(
             cutbacks += (_cutback(place, new),)
     flowing = None
     if failed and failed.trial and bracket.high is not None:
-        flowing = _recorded(place, number + 1, failed, now, load, (), {}, None)
+        there = place._replace(number=number + 1, progress=None)
+        flowing = _recorded(there, failed, now, load, (), {})
     verdict, reason = _verdict(bracket, failed)
     timings = system.timer.since(spent)
     yield Collapsed(
@@ -162,16 +165,12 @@ def _entry(new: Try, system: System, start: np.ndarray, now: Equilibrium) -> Fac
 
 
 def _recorded(
-    place: Place,
-    number: int,
-    new: Try,
-    now: Equilibrium,
-    load: Loading,
-    cutbacks: tuple[Cutback, ...],
-    timings: Mapping[str, float],
-    search: Search | None,
+    place: Place, new: Try, now: Equilibrium, load: Loading, cutbacks: tuple[Cutback, ...], timings: Mapping[str, float]
 ) -> Increment:
-    """The record of the increment that a factor ended with; a flow counts as one increment."""
+    """The record of the increment that a factor ended with, after which the search has come to `place`.
+
+    A flow counts as one increment.
+    """
     goal, trial, end = place.stage.goal, new.trial, _rest(new, now)
     assert isinstance(goal, StrengthSearch)
     assert trial is not None
@@ -180,7 +179,8 @@ def _recorded(
     step = Step(answer, fraction, goal.step, load.total(1.0), load.on_soil(1.0), cutbacks)
     begun = new.fluent.old if new.fluent and new.verdict != EQUILIBRIUM else now
     whole = trial._replace(step=end.displacement - begun.displacement)
-    return increment(place, number, new.system, begun, end, step, whole, dict(timings), search, new.factor, 1.0)
+    found = increment(place, new.system, begun, end, step, whole, dict(timings))
+    return replace(found, strength=new.factor, load_factor=1.0)
 
 
 def _cutback(place: Place, new: Try) -> Cutback:

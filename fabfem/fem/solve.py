@@ -134,7 +134,9 @@ def _through(place: Place, system: System, now: Equilibrium, load: Loading) -> C
             return None, number
         number, old = number + 1, now
         now, at = advanced(old, trial), _gone_on(stage, system, at, old, step, trial, pace)
-        done = increment(place, number, system, old, now, step, trial, system.timer.since(spent), at)
+        done = increment(
+            place._replace(number=number, progress=at), system, old, now, step, trial, system.timer.since(spent)
+        )
         del old, step, trial  # a tangent of all points is large
         yield done
         del done
