@@ -18,6 +18,7 @@ from fabfem.fem.elements import ELEMENTS
 from fabfem.fem.facets import MeshError
 from fabfem.fem.mesh import Mesh
 from fabfem.fem.mesh_files import read_mesh
+from fabfem.fem.regions import Region, with_boundaries, with_zones
 from fabfem.identity import hashed
 from umat.cache import user_cache
 
@@ -31,8 +32,16 @@ def mesh_of(case: BoundaryValueCase) -> Mesh:
     Raises
     ------
     MeshError
-        If the file, or the script's, is no usable mesh.
+        If the file, or the script's, is no usable mesh, or a part that the case names is empty.
     """
+    said = case.mesh
+    sides = {name: (side.of, Region(side.lower, side.upper)) for name, side in said.boundary.items()}
+    zones = {name: Region(zone.lower, zone.upper) for name, zone in said.zone.items()}
+    return with_zones(with_boundaries(_drawn_or_read(case), sides), zones)
+
+
+def _drawn_or_read(case: BoundaryValueCase) -> Mesh:
+    """Return the mesh without the parts that the case names."""
     said = case.mesh
     if said.box is not None:
         return _box(said.box, said.order)

@@ -43,6 +43,8 @@ class Drawn(NamedTuple):
     """Plotter that holds it."""
     bounds: tuple[float, ...]
     """What it should show."""
+    side: Array
+    """Where a solid is looked at from, (3,)."""
 
 
 def draw(folder: Path) -> list[Path]:
@@ -89,11 +91,15 @@ def _shear(plotter: pyvista.Plotter, grid: pyvista.UnstructuredGrid) -> Drawn:
     bounds = busy(grid, upper)
     surface = _cropped(grid.extract_surface(nonlinear_subdivision=2, algorithm="dataset_surface"), bounds)
     colours = span(0.0, upper)
-    plotter.add_mesh(surface, scalars="shear", cmap="OrRd", clim=colours, scalar_bar_args=_bar(title), lighting=False)
+    body = plotter.add_mesh(
+        surface, scalars="shear", cmap="OrRd", clim=colours, scalar_bar_args=_bar(title), lighting=False
+    )
+    body.mapper.resolve = "polygon_offset"  # edges lie on it
+    body.mapper.SetRelativeCoincidentTopologyPolygonOffsetParameters(4.0, 4.0)
     if grid.n_cells < FINE:
         edges = _cropped(grid.linear_copy().extract_all_edges(), bounds)
         plotter.add_mesh(edges, color=INK, line_width=1, opacity=0.3)
-    return Drawn(plotter, bounds)
+    return Drawn(plotter, bounds, facing(grid))
 
 
 def _mechanism(plotter: pyvista.Plotter, grid: pyvista.UnstructuredGrid) -> Drawn:
@@ -115,7 +121,7 @@ def _mechanism(plotter: pyvista.Plotter, grid: pyvista.UnstructuredGrid) -> Draw
     longest = 1.5 * max(bounds[1] - bounds[0], bounds[3] - bounds[2]) / GLYPHS_ACROSS
     arrows = chosen.glyph(orient="displacement_increment", scale="displacement_increment", factor=longest / moved.max())
     plotter.add_mesh(arrows, color=INK, lighting=False)
-    return Drawn(plotter, bounds)
+    return Drawn(plotter, bounds, facing(grid))
 
 
 def _spread(grid: pyvista.UnstructuredGrid, bounds: tuple[float, ...]) -> NDArray[np.bool_]:
@@ -154,8 +160,9 @@ def _fabric(plotter: pyvista.Plotter, grid: pyvista.UnstructuredGrid) -> Drawn:
     bounds = busy(grid, max(float(np.nanpercentile(grid["shear"], SATURATED)), 1e-12))
     outline = _cropped(grid.extract_surface(nonlinear_subdivision=2, algorithm="dataset_surface"), bounds)
     whole = outline.extract_surface(algorithm="dataset_surface").clean(tolerance=1e-6)  # cropping parts the elements
-    edge = whole.extract_feature_edges(manifold_edges=False, feature_edges=False)
-    plotter.add_mesh(outline, color="#f4f1ea", lighting=False)
+    solid = grid_is_solid(grid)
+    edge = whole.extract_feature_edges(manifold_edges=False, feature_edges=solid)
+    plotter.add_mesh(outline, color="#f4f1ea", lighting=False, opacity=0.2 if solid else 1.0)
     plotter.add_mesh(edge, color=INK, line_width=2)
     glyphs = pyvista.merge(list(_glyphs(grid, bounds)))
     plotter.add_mesh(
@@ -164,9 +171,9 @@ def _fabric(plotter: pyvista.Plotter, grid: pyvista.UnstructuredGrid) -> Drawn:
         cmap="viridis",
         clim=span(glyphs["norm"].min(), glyphs["norm"].max()),
         scalar_bar_args=_bar("norm of the fabric anisotropy F; ellipses are long where contact normals point"),
-        lighting=grid_is_solid(grid),
+        lighting=solid,
     )
-    return Drawn(plotter, bounds)
+    return Drawn(plotter, bounds, facing(grid))
 
 
 def _glyphs(grid: pyvista.UnstructuredGrid, bounds: tuple[float, ...]) -> Iterator[pyvista.PolyData]:
@@ -192,7 +199,22 @@ def sampled(grid: pyvista.UnstructuredGrid, bounds: tuple[float, ...], spacing: 
         inside &= np.asarray(straight.find_containing_cell(lattice + 0.4 * spacing * direction)) >= 0
     probed = pyvista.PolyData(lattice[inside]).sample(straight, tolerance=1e-6 * grid.length)
     good = np.isfinite(probed["fabric"]).all(axis=1) & (probed["vtkValidPointMask"] > 0)
-    return lattice[inside][good], tensors(probed["fabric"][good])
+    shown = good & near_faces(lattice[inside], spacing, facing(grid)) if grid_is_solid(grid) else good
+    return lattice[inside][shown], tensors(probed["fabric"][shown])
+
+
+def near_faces(places: Array, spacing: float, side: Array) -> NDArray[np.bool_]:
+    """Return which places of a lattice lie in the outermost layer of either upright face that is looked at."""
+    outermost = np.where(side < 0.0, places.min(axis=0), places.max(axis=0))
+    return (np.abs(places - outermost)[:, :2] < 0.5 * spacing).any(axis=1)
+
+
+def facing(grid: pyvista.UnstructuredGrid) -> Array:
+    """Return where to look from at a solid (3,): from above, at the upright faces next to where it shears most."""
+    weights = np.nan_to_num(grid["shear"]) ** 2
+    middle = 0.5 * (grid.points.min(axis=0) + grid.points.max(axis=0))
+    towards = weights @ (grid.points - middle) / max(float(weights.sum()), 1e-300)
+    return np.array([-1.0 if towards[0] < 0.0 else 1.0, -1.0 if towards[1] < 0.0 else 1.0, 0.6])
 
 
 def span(low: float, high: float) -> tuple[float, float]:
@@ -245,11 +267,13 @@ def _bar(title: str) -> dict[str, object]:
 
 def _shoot(drawn: Drawn, title: str, picture: Path) -> Path:
     """Frame the scene between its title and the colour bar, and write the picture."""
-    plotter, bounds = drawn
+    plotter, bounds, side = drawn
     text = plotter.add_text(title, position=(0.02, 0.91), viewport=True, font_size=12, color=INK)
     text.GetTextProperty().SetLineSpacing(1.25)
     if bounds[5] > bounds[4]:
-        plotter.view_isometric()
+        plotter.view_vector(side, viewup=(0.0, 0.0, 1.0))
+        plotter.camera.zoom(0.9)
+        plotter.camera.SetWindowCenter(0.0, -0.16)  # above the colour bar
         plotter.add_axes(color=INK)
     else:
         plotter.view_xy()
