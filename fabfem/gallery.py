@@ -117,7 +117,7 @@ def _guarded(file: Path, folder: Path, pool: Pool) -> Shown:
 
 def _swept(file: Path, folder: Path, pool: Pool) -> Shown:
     done = sweep(file, folder, quiet=True, pool=pool)
-    drawn = show(folder).pictures if done.pictures else ()
+    drawn = show(folder).pictures
     left = done.runs - done.completed
     reason = f"{left} of {done.runs} runs did not complete; {done.table} says why" if left else ""
     return Shown(file.stem, done.runs, done.seconds, "incomplete" if left else RIGHT, reason, _names(drawn))

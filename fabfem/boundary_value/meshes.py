@@ -16,6 +16,7 @@ from fabfem.case.mesh import Box
 from fabfem.fem.box import box_mesh
 from fabfem.fem.elements import ELEMENTS
 from fabfem.fem.mesh import Mesh, MeshError, read_mesh
+from fabfem.fem.regions import Region, with_boundaries, with_zones
 from fabfem.identity import hashed
 from umat.cache import user_cache
 
@@ -29,8 +30,16 @@ def mesh_of(case: BoundaryValueCase) -> Mesh:
     Raises
     ------
     MeshError
-        If the file, or the script's, is no usable mesh.
+        If the file, or the script's, is no usable mesh, or a part that the case names is empty.
     """
+    said = case.mesh
+    sides = {name: (side.of, Region(side.lower, side.upper)) for name, side in said.boundary.items()}
+    zones = {name: Region(zone.lower, zone.upper) for name, zone in said.zone.items()}
+    return with_zones(with_boundaries(_drawn_or_read(case), sides), zones)
+
+
+def _drawn_or_read(case: BoundaryValueCase) -> Mesh:
+    """Return the mesh without the parts that the case names."""
     said = case.mesh
     if said.box is not None:
         return _box(said.box, said.order)

@@ -51,6 +51,34 @@ class Box(Table):
         return tuple(max(1, round((high - low) / self.size)) for low, high in zip(self.lower, self.upper, strict=True))
 
 
+class Region(Table):
+    """A box along the axes."""
+
+    lower: Corner
+    """Corner with the smallest coordinates [length]."""
+    upper: Corner
+    """Corner with the largest coordinates [length]."""
+
+    @model_validator(mode="after")
+    def _ordered(self) -> "Region":
+        if len(self.lower) != len(self.upper):
+            raise ValueError("needs as many numbers in lower and upper")
+        if any(low > high for low, high in zip(self.lower, self.upper, strict=True)):
+            raise ValueError("must not have lower above upper along any axis")
+        return self
+
+
+class Side(Region):
+    """A part of a boundary: all its facets that lie in a box along the axes. The whole boundary stays what it is."""
+
+    of: Text
+    """Boundary that it is a part of."""
+
+
+class Layer(Region):
+    """A zone: all elements whose centre lies in a box along the axes. They leave the zones they were in."""
+
+
 class Mesh(Table):
     """The mesh: one of a file, a box and a script."""
 
@@ -62,6 +90,10 @@ class Mesh(Table):
     """Python script that writes a mesh, called as ``python SCRIPT FILE name=value ...``; relative to the case file."""
     parameters: dict[Identifier, int | float | str] = Field(default={})
     """Names and values that the script is called with."""
+    boundary: dict[Identifier, Side] = Field(default={})
+    """Further boundaries by name, such as the strip under a footing."""
+    zone: dict[Identifier, Layer] = Field(default={})
+    """Further zones by name, such as a layer."""
     order: Annotated[int, Field(ge=1, le=2)] = 2
     """Order of the displacement in an element."""
     points: Annotated[int, Field(ge=1)] | None = None

@@ -114,7 +114,11 @@ class Exponential(Table):
 
 
 class SweptPicture(Table):
-    """A picture of all runs of a sweep: columns of their histories, or the states that they pass."""
+    """A picture of all runs of a sweep: columns of their histories, or the states that they pass.
+
+    A sweep that has none, and no measured curves, is drawn with its columns over the first one, or, where only the last
+    rows are kept, over the first parameter.
+    """
 
     name: Identifier
     """Name of the file."""

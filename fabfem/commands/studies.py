@@ -42,11 +42,9 @@ def _sweep(options: argparse.Namespace) -> int:
     from fabfem.study.sweep import sweep
 
     swept = sweep(options.case, _folder(options, "sweep"), options.quiet)
-    pictures: tuple[Path, ...] = ()
-    if swept.pictures:
-        from fabfem.pictures.sweep import draw
+    from fabfem.pictures.sweep import draw
 
-        pictures = draw(swept.folder)
+    pictures = draw(swept.folder)
     if not options.quiet:
         counted = f"{swept.completed} of {swept.runs} runs completed"
         print(counted, *(f"  {file}" for file in (swept.table, *pictures)), sep="\n")

@@ -24,6 +24,14 @@ SATURATED = 96.0
 """Percentile of the shear strain at which the colours end; the corners of a footing strain without bound."""
 GLYPHS_ACROSS = 24
 """Fabric glyphs across the picture."""
+UNIFORM = 0.02
+"""Least span of a colour bar over its largest value: what varies less has about one colour."""
+LABELS = 4
+"""Intervals between the labels of a colour bar."""
+ROUND = np.array([1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 15.0, 20.0])
+"""Numbers whose multiples are easily read."""
+FINE = 15_000
+"""Elements from which their edges would hide what they lie in."""
 STRETCH = 1.5
 """Exaggeration of the anisotropy of a fabric glyph."""
 
@@ -35,12 +43,14 @@ class Drawn(NamedTuple):
     """Plotter that holds it."""
     bounds: tuple[float, ...]
     """What it should show."""
+    side: Array
+    """Where a solid is looked at from, (3,)."""
 
 
 def draw(folder: Path) -> list[Path]:
     """Draw the pictures that the last stored increment has fields for, and return their files."""
     grid = _last(folder)
-    deformed = grid.warp_by_vector("displacement") if "displacement" in grid.point_data else grid
+    deformed = moved_to(grid) if "displacement" in grid.point_data else grid
     plotter, title = _plotter(), _title(folder)
     pictures = [_shoot(_shear(plotter, deformed), title, folder / "shear_strain.png")]
     if {"displacement_increment", "strain_increment"} <= set(grid.point_data.keys()):
@@ -60,6 +70,16 @@ def _last(folder: Path) -> pyvista.UnstructuredGrid:
     return reader.read()[0]
 
 
+def moved_to(grid: pyvista.UnstructuredGrid) -> pyvista.UnstructuredGrid:
+    """Return the grid where it has moved to; of a section through a twisted body, only what it moves in its plane."""
+    moved = np.array(grid.point_data["displacement"])
+    if not grid_is_solid(grid):
+        moved[:, 2] = 0.0
+    found = grid.copy()
+    found.points = grid.points + moved
+    return found
+
+
 def _shear(plotter: pyvista.Plotter, grid: pyvista.UnstructuredGrid) -> "Drawn":
     """Draw the deformed mesh, coloured by shear strain where strain was stored, else by displacement."""
     if "strain" in grid.point_data:
@@ -72,12 +92,16 @@ def _shear(plotter: pyvista.Plotter, grid: pyvista.UnstructuredGrid) -> "Drawn":
         title += f"; darkest at {upper:.3g} and above, the most is {float(np.nanmax(grid['shear'])):.3g}"
     bounds = busy(grid, upper)
     surface = _cropped(grid.extract_surface(nonlinear_subdivision=2, algorithm="dataset_surface"), bounds)
-    edges = _cropped(grid.linear_copy().extract_all_edges(), bounds)
-    plotter.add_mesh(
-        surface, scalars="shear", cmap="OrRd", clim=(0.0, upper), scalar_bar_args=_bar(title), lighting=False
+    colours = span(0.0, upper)
+    body = plotter.add_mesh(
+        surface, scalars="shear", cmap="OrRd", clim=colours, scalar_bar_args=_bar(title), lighting=False
     )
-    plotter.add_mesh(edges, color=INK, line_width=1, opacity=0.3)
-    return Drawn(plotter, bounds)
+    body.mapper.resolve = "polygon_offset"  # edges lie on it
+    body.mapper.SetRelativeCoincidentTopologyPolygonOffsetParameters(4.0, 4.0)
+    if grid.n_cells < FINE:
+        edges = _cropped(grid.linear_copy().extract_all_edges(), bounds)
+        plotter.add_mesh(edges, color=INK, line_width=1, opacity=0.3)
+    return Drawn(plotter, bounds, facing(grid))
 
 
 def _mechanism(plotter: pyvista.Plotter, grid: pyvista.UnstructuredGrid) -> "Drawn":
@@ -99,7 +123,7 @@ def _mechanism(plotter: pyvista.Plotter, grid: pyvista.UnstructuredGrid) -> "Dra
     longest = 1.5 * max(bounds[1] - bounds[0], bounds[3] - bounds[2]) / GLYPHS_ACROSS
     arrows = chosen.glyph(orient="displacement_increment", scale="displacement_increment", factor=longest / moved.max())
     plotter.add_mesh(arrows, color=INK, lighting=False)
-    return Drawn(plotter, bounds)
+    return Drawn(plotter, bounds, facing(grid))
 
 
 def _spread(grid: pyvista.UnstructuredGrid, bounds: tuple[float, ...]) -> NDArray[np.bool_]:
@@ -137,20 +161,21 @@ def _fabric(plotter: pyvista.Plotter, grid: pyvista.UnstructuredGrid) -> "Drawn"
     """Draw the density of contacts as ellipsoids, long where contact normals gather."""
     bounds = busy(grid, max(float(np.nanpercentile(grid["shear"], SATURATED)), 1e-12))
     outline = _cropped(grid.extract_surface(nonlinear_subdivision=2, algorithm="dataset_surface"), bounds)
-    edge = outline.extract_surface(algorithm="dataset_surface").extract_feature_edges(
-        manifold_edges=False, feature_edges=False
-    )
-    plotter.add_mesh(outline, color="#f4f1ea", lighting=False)
+    whole = outline.extract_surface(algorithm="dataset_surface").clean(tolerance=1e-6)  # cropping parts the elements
+    solid = grid_is_solid(grid)
+    edge = whole.extract_feature_edges(manifold_edges=False, feature_edges=solid)
+    plotter.add_mesh(outline, color="#f4f1ea", lighting=False, opacity=0.2 if solid else 1.0)
     plotter.add_mesh(edge, color=INK, line_width=2)
     glyphs = pyvista.merge(list(_glyphs(grid, bounds)))
     plotter.add_mesh(
         glyphs,
         scalars="norm",
         cmap="viridis",
+        clim=span(glyphs["norm"].min(), glyphs["norm"].max()),
         scalar_bar_args=_bar("norm of the fabric anisotropy F; ellipses are long where contact normals point"),
-        lighting=grid_is_solid(grid),
+        lighting=solid,
     )
-    return Drawn(plotter, bounds)
+    return Drawn(plotter, bounds, facing(grid))
 
 
 def _glyphs(grid: pyvista.UnstructuredGrid, bounds: tuple[float, ...]) -> Iterator[pyvista.PolyData]:
@@ -176,7 +201,33 @@ def sampled(grid: pyvista.UnstructuredGrid, bounds: tuple[float, ...], spacing: 
         inside &= np.asarray(straight.find_containing_cell(lattice + 0.4 * spacing * direction)) >= 0
     probed = pyvista.PolyData(lattice[inside]).sample(straight, tolerance=1e-6 * grid.length)
     good = np.isfinite(probed["fabric"]).all(axis=1) & (probed["vtkValidPointMask"] > 0)
-    return lattice[inside][good], tensors(probed["fabric"][good])
+    shown = good & near_faces(lattice[inside], spacing, facing(grid)) if grid_is_solid(grid) else good
+    return lattice[inside][shown], tensors(probed["fabric"][shown])
+
+
+def near_faces(places: Array, spacing: float, side: Array) -> NDArray[np.bool_]:
+    """Return which places of a lattice lie in the outermost layer of either upright face that is looked at."""
+    outermost = np.where(side < 0.0, places.min(axis=0), places.max(axis=0))
+    return (np.abs(places - outermost)[:, :2] < 0.5 * spacing).any(axis=1)
+
+
+def facing(grid: pyvista.UnstructuredGrid) -> Array:
+    """Return where to look from at a solid (3,): from above, at the upright faces next to where it shears most."""
+    weights = np.nan_to_num(grid["shear"]) ** 2
+    middle = 0.5 * (grid.points.min(axis=0) + grid.points.max(axis=0))
+    towards = weights @ (grid.points - middle) / max(float(weights.sum()), 1e-300)
+    return np.array([-1.0 if towards[0] < 0.0 else 1.0, -1.0 if towards[1] < 0.0 else 1.0, 0.6])
+
+
+def span(low: float, high: float) -> tuple[float, float]:
+    """Return where the colours of values from low to high begin and end, so that all labels between are round."""
+    least = max(high - low, UNIFORM * max(abs(low), abs(high)), 1e-12) / LABELS
+    power = 10.0 ** np.floor(np.log10(least))
+    for step in power * ROUND:
+        first = step * np.floor(low / step * (1.0 + 1e-9))
+        if step >= least * (1.0 - 1e-9) and first + LABELS * step >= high * (1.0 - 1e-9):
+            break
+    return float(first), float(first + LABELS * step)
 
 
 def tensors(components: Array) -> Array:
@@ -208,7 +259,7 @@ def _bar(title: str) -> dict[str, object]:
         "color": INK,
         "title_font_size": 30,
         "label_font_size": 26,
-        "fmt": "%.3g",
+        "fmt": "%.4g",
         "position_x": 0.25,
         "position_y": 0.03,
         "width": 0.5,
@@ -218,10 +269,13 @@ def _bar(title: str) -> dict[str, object]:
 
 def _shoot(drawn: Drawn, title: str, picture: Path) -> Path:
     """Frame the scene between its title and the colour bar, and write the picture."""
-    plotter, bounds = drawn
-    plotter.add_text(title, position=(0.02, 0.91), viewport=True, font_size=12, color=INK)
+    plotter, bounds, side = drawn
+    text = plotter.add_text(title, position=(0.02, 0.91), viewport=True, font_size=12, color=INK)
+    text.GetTextProperty().SetLineSpacing(1.25)
     if bounds[5] > bounds[4]:
-        plotter.view_isometric()
+        plotter.view_vector(side, viewup=(0.0, 0.0, 1.0))
+        plotter.camera.zoom(0.9)
+        plotter.camera.SetWindowCenter(0.0, -0.16)  # above the colour bar
         plotter.add_axes(color=INK)
     else:
         plotter.view_xy()

@@ -8,9 +8,10 @@ import json
 import os
 import subprocess
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from importlib import import_module
 from pathlib import Path
+from textwrap import fill
 from typing import Any, NamedTuple
 
 from fabfem.case import CaseError
@@ -21,6 +22,20 @@ DRAW = (sys.executable, "-m", "fabfem.pictures.draw")
 
 DRAWERS = {"fabric": "fabfem.pictures.curves", "element": "fabfem.pictures.laboratory"}
 """Module that draws the pictures of a kind of scene which is no boundary-value problem; it has `draw(folder)`."""
+
+HOLLOW_CYLINDER = (("mean_gamma [-]", "mean_tau"), ("mean_eps_z [-]", "mean_sigma_z"))
+"""Strain and stress of a hollow cylinder, twisted or pressed."""
+
+GREEK = {"gamma": "γ", "tau": "τ", "eps": "ε", "sigma": "σ", "theta": "θ"}
+FACTOR = "strength_factor [-]"
+"""What the strength of a slope is divided by."""
+
+MANY_RUNS = {
+    "sweep.json": "fabfem.pictures.sweep",
+    "study.json": "fabfem.pictures.work_precision",
+    "calibration.json": "fabfem.pictures.calibration",
+}
+"""Module that draws the pictures of many runs of a case, by the file that tells them; it has `draw(folder)`."""
 
 TIME_LIMIT = 600.0
 """Longest time that drawing the fields may take [s]."""
@@ -46,15 +61,17 @@ def show(folder: Path) -> Shown:
     Parameters
     ----------
     folder : Path
-        Folder that ``fabfem solve`` or ``fabfem sweep`` wrote.
+        Folder that ``fabfem solve``, ``sweep``, ``study`` or ``calibrate`` wrote.
 
     Raises
     ------
     CaseError
         If the folder holds no result.
     """
-    if (folder / "sweep.json").is_file():
-        return Shown(tuple(import_module("fabfem.pictures.sweep").draw(folder)), "")
+    for file, module in MANY_RUNS.items():
+        if (folder / file).is_file():
+            found = import_module(module).draw(folder)
+            return Shown((found,) if isinstance(found, Path) else tuple(found), "")
     if not (folder / "history.csv").is_file():
         raise CaseError(f"{folder}: holds no result (there is no history.csv)")
     drawer = DRAWERS.get(_kind(folder))
@@ -87,15 +104,40 @@ def _draw_fields(folder: Path) -> str:
 
 
 def _curve(folder: Path) -> Sequence[Path]:
-    """Draw the first derived column, or reaction, over the first probe, if the case has them."""
+    """Draw what the test is about, if the history has it."""
     headers, rows = read_history(folder / "history.csv")
-    asked = _columns(folder)
-    across = next((name for name in asked["probe"] if name in headers), None)
-    up = next((name for name in (*asked["derived"], *asked["reaction"]) if name in headers), None)
-    if across is None or up is None or not rows:
-        return ()
-    at = headers.index(across), headers.index(up)
-    return (_plot(folder, across, up, [(float(row[at[0]]), float(row[at[1]])) for row in rows]),)
+    for across, up in _pairs(headers, rows, _columns(folder)):
+        if {across, up} <= set(headers):
+            rows = [row for row in rows if up != FACTOR or row[0] == rows[-1][0]]  # the stage that searches is the last
+            at = headers.index(across), headers.index(up)
+            points = [(float(row[at[0]]), float(row[at[1]])) for row in rows if row[at[0]] and row[at[1]]]
+            return (_plot(folder, across, up, points),) if points else ()
+    return ()
+
+
+def _pairs(
+    headers: Sequence[str], rows: Sequence[Sequence[str]], asked: dict[str, list[str]]
+) -> Iterator[tuple[str, str]]:
+    """Yield what could be drawn over what, the best first.
+
+    The first derived column, or reaction, over the first probe; of a hollow cylinder the stress whose strain has gone
+    farthest; of a slope the factor of its strength.
+    """
+    probes = [name for name in asked["probe"] if name in headers]
+    for force in (*asked["derived"], *asked["reaction"]):
+        yield from ((probe, force) for probe in probes)
+    found = [(strain, _named(headers, stress)) for strain, stress in HOLLOW_CYLINDER if strain in headers]
+    yield from sorted(found, key=lambda pair: -_farthest(rows, headers.index(pair[0])))
+    yield from ((probe, FACTOR) for probe in probes)
+
+
+def _named(headers: Sequence[str], name: str) -> str:
+    """Return the header of a column with its unit."""
+    return next((header for header in headers if header.startswith(f"{name} [")), "")
+
+
+def _farthest(rows: Sequence[Sequence[str]], column: int) -> float:
+    return max((abs(float(row[column])) for row in rows if row[column]), default=0.0)
 
 
 def _plot(folder: Path, across: str, up: str, points: Sequence[tuple[float, float]]) -> Path:
@@ -105,7 +147,7 @@ def _plot(folder: Path, across: str, up: str, points: Sequence[tuple[float, floa
     figure = Figure(figsize=(8, 5), layout="constrained")
     axes = figure.add_subplot()
     axes.plot(*zip(*points, strict=True), color="#1f5a8a", linewidth=2, marker="o", markersize=3)
-    axes.set(xlabel=_axis(across), ylabel=_axis(up), title=_title(folder))
+    axes.set(xlabel=_axis(across), ylabel=_axis(up), title=fill(_title(folder), 80))
     axes.grid(alpha=0.3)
     axes.spines[["top", "right"]].set_visible(False)
     FigureCanvasAgg(figure)
@@ -114,7 +156,8 @@ def _plot(folder: Path, across: str, up: str, points: Sequence[tuple[float, floa
 
 
 def _axis(header: str) -> str:
-    return header.removesuffix(" [-]").replace("_", " ").replace("gamma", "γ")
+    words = header.removesuffix(" [-]").replace("_", " ")
+    return " ".join(GREEK.get(word, word).replace("(gamma", "(γ") for word in words.split(" "))
 
 
 def _report(folder: Path) -> dict[str, object]:

@@ -1,7 +1,8 @@
 """Pictures of a sweep: the curves of all its runs in one row of axes, or the states that they pass as points.
 
 The values of one parameter have colours, those of another may have styles of line. Measured curves that the case
-compares with have a picture of their own, ``measured.png``.
+compares with have a picture of their own, ``measured.png``. A sweep that asks for no picture has ``sweep.png``: its
+columns over the first of them, or, of runs of which only the end is kept, over the first parameter.
 """
 
 import csv
@@ -21,14 +22,19 @@ from matplotlib.lines import Line2D
 
 from fabfem.case import CaseError, suggest
 from fabfem.pictures import calibration
-from fabfem.pictures.curves import STYLES
+from fabfem.pictures.curves import KEY, STYLES
 from fabfem.pictures.laboratory import LABELS
 from fabfem.pictures.work_precision import COLOURS
+from fabfem.study.sweep import ABOUT
 
 ROUNDING = 1e-9
 MARKERS = "osD^vP"
 ACROSS = 4
 """Most panels side by side."""
+MOST = 8
+"""Most panels of a picture that nobody asked for; the last columns are what a case derives."""
+COUNTS = ("stage", "increment", "time", "iterations", "load_factor")
+"""Columns of every history."""
 WORDS = LABELS | {"gamma": "shear strain ε1 − ε3", "psi": "state parameter ψ", "zeta": "dilatancy state ζ"}
 WORDS |= {"eps_axial": "axial strain", "F_alpha": "angle of F from the vertical", "b": "b"}
 WORDS |= {f"start_{name}": f"{WORDS[name]} at the start" for name in ("psi", "zeta")}
@@ -48,13 +54,56 @@ def draw(folder: Path) -> tuple[Path, ...]:
     pictures = []
     for picture in about["pictures"]:
         figure = _states(folder, about, picture) if picture["states"] else _curves(folder, about, picture)
-        figure.suptitle(fill(about["title"], int(12 * figure.get_figwidth())), fontsize=10)
-        FigureCanvasAgg(figure)
-        figure.savefig(folder / f"{picture['name']}.png", dpi=100)
-        pictures.append(folder / f"{picture['name']}.png")
+        pictures.append(_saved(figure, folder, about, picture["name"]))
     if (folder / "measured_curves.csv").is_file():
         pictures.append(calibration.draw(folder, "measured", about["title"]))
+    usual = None if pictures else _usual(folder, about)
+    if usual:
+        pictures.append(_saved(usual, folder, about, "sweep"))
     return tuple(pictures)
+
+
+def _saved(figure: Figure, folder: Path, about: Any, name: str) -> Path:
+    figure.suptitle(fill(about["title"], int(12 * figure.get_figwidth())), fontsize=10)
+    FigureCanvasAgg(figure)
+    figure.savefig(folder / f"{name}.png", dpi=100)
+    return folder / f"{name}.png"
+
+
+def _usual(folder: Path, about: Any) -> Figure | None:
+    """Return the figure of a sweep that asks for none, if its table has columns to draw."""
+    lines, units = _read(folder / "sweep.csv")
+    names = list(units)
+    columns = [name for name in names[len(about["parameters"]) + len(ABOUT) :] if name not in COUNTS]
+    columns = [name for name in columns if any(np.isfinite(_number(line[name])) for line in lines)]
+    if not columns or not lines:
+        return None
+    if len({tuple(line[name] for name in about["parameters"]) for line in lines}) == len(lines):
+        return _ends(lines, units, about["parameters"], columns[-MOST:])
+    across, *up = columns if len(columns) > 1 else [next(name for name in ("time", *names) if name in names), *columns]
+    picture = {"name": "sweep", "x": [across] * len(up[-MOST:]), "y": up[-MOST:], "colour": None, "until": None}
+    return _curves(folder, about, picture | {"style": about["parameters"][1] if len(about["parameters"]) > 1 else None})
+
+
+def _ends(
+    lines: Sequence[dict[str, str]], units: dict[str, str], parameters: Sequence[str], columns: Sequence[str]
+) -> Figure:
+    """Draw the ends of all runs over the first parameter, with a line for each choice of the others."""
+    across, *others = parameters
+    groups: dict[str, list[dict[str, str]]] = {}
+    for line in lines:
+        groups.setdefault(", ".join(f"{name} = {_short(line[name])}" for name in others), []).append(line)
+    words = not all(np.isfinite(_number(line[across])) for line in lines)
+    figure, axes = _figure(len(columns))
+    for ax, column in zip(axes, columns, strict=False):
+        for (label, rows), shade in zip(groups.items(), _shades(len(groups)), strict=True):
+            at = [_short(row[across]) if words else _number(row[across]) for row in rows]
+            ax.plot(at, [_number(row[column]) for row in rows], "o-", color=shade, markersize=4, label=label)
+        _plain(ax, across, column, units, numbers=not words)
+    if others:
+        handles, labels = axes[0].get_legend_handles_labels()
+        figure.legend(handles, labels, fontsize=8, frameon=False, loc="outside lower center", ncols=_beside(figure))
+    return figure
 
 
 def _curves(folder: Path, about: Any, picture: Any) -> Figure:
@@ -74,7 +123,8 @@ def _curves(folder: Path, about: Any, picture: Any) -> Figure:
         _plain(ax, x, y, units)
     key = {f"{colour} = {_short(value)}": Line2D([], [], color=shade) for value, shade in colours.items()}
     key |= {value: Line2D([], [], color="#444444", linestyle=line) for value, (_, line) in styles.items()}
-    figure.legend(list(key.values()), list(key), fontsize=8, frameon=False, loc="outside lower center", ncols=len(key))
+    ncols = min(len(key), _beside(figure))
+    figure.legend(list(key.values()), list(key), fontsize=8, frameon=False, loc="outside lower center", ncols=ncols)
     return figure
 
 
@@ -166,19 +216,27 @@ def _figure(panels: int) -> tuple[Figure, list[Axes]]:
     return figure, [figure.add_subplot(down, across, k + 1) for k in range(panels)]
 
 
-def _plain(ax: Axes, x: str, y: str, units: dict[str, str]) -> None:
+def _beside(figure: Figure) -> int:
+    """Return how many entries of a key fit side by side."""
+    return max(1, int(figure.get_figwidth() / KEY))
+
+
+def _plain(ax: Axes, x: str, y: str, units: dict[str, str], numbers: bool = True) -> None:
     ax.set(xlabel=_label(x, units), ylabel=_label(y, units))
     ax.xaxis.label.set_fontsize(9)
     ax.yaxis.label.set_fontsize(9)
     ax.tick_params(labelsize=8)
-    ax.locator_params(axis="x", nbins=6)
+    if numbers:
+        ax.locator_params(axis="x", nbins=6)
     ax.grid(alpha=0.3)
     ax.spines[["top", "right"]].set_visible(False)
 
 
 def _label(name: str, units: dict[str, str]) -> str:
     unit = units.get(name, "")
-    return WORDS.get(name, name) + (f" [{unit}]" if unit not in ("-", "") else "")
+    return WORDS.get(name, name.replace("_", " ").replace("gamma", "γ")) + (
+        f" [{unit}]" if unit not in ("-", "") else ""
+    )
 
 
 def _number(text: str) -> float:

@@ -41,8 +41,6 @@ class Swept(NamedTuple):
     """Runs in it."""
     completed: int
     """Those that completed."""
-    pictures: int
-    """Pictures that the case asks for."""
     seconds: float
     """Processor time of all runs [s], those that were kept from before included."""
 
@@ -84,8 +82,7 @@ def sweep(path: Path, folder: Path, quiet: bool = False, pool: Pool | None = Non
         _conclude(case, said, in_order, folder)
     ended = [run.ran.status for run in in_order]
     seconds = sum(median(run.ran.cpu) for run in in_order if run.ran.cpu)
-    pictures = len(said.picture) + (said.measured is not None)
-    return Swept(folder / "sweep.csv", len(ended), ended.count("completed"), pictures, seconds)
+    return Swept(folder / "sweep.csv", len(ended), ended.count("completed"), seconds)
 
 
 def _conclude(case: Case, said: Sweep, ended: Sequence[Run], folder: Path) -> None:

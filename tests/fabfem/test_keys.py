@@ -23,7 +23,7 @@ def test_the_page_is_what_the_command_prints(capsys: pytest.CaptureFixture[str])
 
 def said(table: dict[str, Any], place: str = "") -> Iterator[tuple[str, str, Any]]:
     """Yield the place, key and value of all that stands in a table."""
-    named = place in ("material", "law")
+    named = place in ("material", "law", "mesh.boundary", "mesh.zone")
     for key, value in table.items():
         below = f"{place}.{'NAME' if named else key}".lstrip(".")
         for one in value if isinstance(value, list) else [value]:

@@ -46,6 +46,17 @@ SCENES = [
     ("footing/strip_toyoura_gmsh.toml", sunk("y"), "q/(gamma B)", 0.59195, 1e-3),
     ("footing/strip_toyoura_abaqus.toml", sunk("y"), "q/(gamma B)", 0.59195, 1e-3),
     (
+        "footing/square_toyoura.toml",
+        {
+            "mesh.box.cells": [4, 4, 3],
+            "stage[settlement].displacement": [{"boundary": "footing", "x": 0.0, "y": 0.0, "z": -0.002}],
+            **PUSH,
+        },
+        "q/(gamma B)",
+        1.02680,
+        1e-3,
+    ),
+    (
         "specimen/triaxial_rough.toml",
         {
             "mesh.box.cells": [2, 4],

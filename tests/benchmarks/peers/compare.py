@@ -1,8 +1,7 @@
 """The footings by fabfem and by its peers, in turn, and how fabfem's cost grows: tables of docs/performance.md.
 
-    python tests/benchmarks/peers/compare.py --dofs 5k 20k 81k --repeats 3 --pip /tmp/peers/bin/python
-    python tests/benchmarks/peers/compare.py --dofs 20k --repeats 1 --skfem python --ccx python
-    python tests/benchmarks/peers/compare.py --dofs solid-50k solid-150k --repeats 1
+    python tests/benchmarks/peers/compare.py --dofs 5k 20k 81k --repeats 3 --pip PYTHON --skfem python --ccx python
+    python tests/benchmarks/peers/compare.py --dofs solid-50k solid-150k --repeats 3
     python tests/benchmarks/peers/compare.py --growth --repeats 3
 
 Wall times are medians, processor times and memory the least; each over fabfem's first row. Each size has a table of its

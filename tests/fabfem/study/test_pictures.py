@@ -119,6 +119,14 @@ def test_pictures_of_a_sweep_are_drawn_again_by_show(swept):
     assert all(picture.stat().st_size > 5000 for picture in pictures)
 
 
+@pytest.mark.parametrize(("file", "module"), [("study.json", "work_precision"), ("calibration.json", "calibration")])
+def test_show_draws_studies_and_calibrations_again(file, module, tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(f"fabfem.pictures.{module}.draw", lambda folder: folder / "drawn.png")
+    (tmp_path / file).write_text("{}", encoding="utf-8")
+    assert main(["show", str(tmp_path)]) == 0
+    assert capsys.readouterr().out == f"{tmp_path / 'drawn.png'}\n"
+
+
 def test_a_picture_ends_where_it_is_told(swept):
     from fabfem.pictures.sweep import _read, _runs
 
@@ -126,6 +134,25 @@ def test_a_picture_ends_where_it_is_told(swept):
     runs = _runs(_read(swept / "sweep.csv")[0], ["test"], until)
     assert [run["test"] for run in runs] == ["soft", "stiff"]
     assert all(run["columns"]["eps_axial"][-1] == pytest.approx(0.005) for run in runs)
+
+
+@pytest.mark.parametrize(
+    ("kept", "across", "points"), [('rows = "all"\ncolumns = ["p", "q"]', "p", 11), ('rows = "last"', "test", 2)]
+)
+def test_a_sweep_that_asks_for_no_picture_has_one(kept, across, points, tmp_path, monkeypatch):
+    """Histories over their first column, a line for each run; ends over the parameter, by its labels."""
+    from fabfem.pictures import sweep as pictures
+
+    drawn = []
+    monkeypatch.setattr(pictures, "_saved", lambda figure, folder, *_: drawn.append(figure) or folder / "sweep.png")
+    file = written(tmp_path, CASE.replace('rows = "all"', kept))
+    assert main(["sweep", str(file), "--out", str(tmp_path / "out"), "--quiet"]) == 0
+    (figure,) = drawn
+    axes = [ax for ax in figure.axes if "q" in ax.get_ylabel().split()]
+    assert [pictures._label(across, {}) in ax.get_xlabel() for ax in axes] == [True]
+    lines = axes[0].get_lines()
+    assert [len(line.get_xdata()) for line in lines] == ([points] * 2 if across == "p" else [points])
+    assert float(lines[-1].get_ydata()[-1]) == pytest.approx(200.0, rel=1e-6)
 
 
 WRONG = {
@@ -272,4 +299,4 @@ def test_a_sweep_takes_the_processes_it_is_given(swept):
             return iter(())
 
     done = sweep(swept.parent / "case.toml", swept, quiet=True, pool=Refusing())  # type: ignore[arg-type]
-    assert (done.runs, done.completed, done.pictures) == (2, 2, 2)
+    assert (done.runs, done.completed) == (2, 2)
