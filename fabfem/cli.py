@@ -28,7 +28,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     arguments : sequence of str, optional
         Words after the command; those of the process by default.
     """
-    options = parser().parse_args(arguments)
+    words = sys.argv[1:] if arguments is None else list(arguments)
+    if not words:
+        parser().print_help()
+        return BAD_INPUT
+    options = parser().parse_args(words)
     gc.set_threshold(50_000, 20, 50)  # most objects of a command stay: looking through them is a tenth of a short run
     atexit.register(gc.freeze)  # and the interpreter need not look through them once more before it leaves
     try:

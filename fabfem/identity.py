@@ -56,7 +56,7 @@ def _differing(then: Any, now: Any, place: str) -> Iterator[str]:
             if place or key != "hash":
                 yield from _differing(then.get(key), now.get(key), f"{place}.{key}" if place else key)
     elif isinstance(then, list) and isinstance(now, list) and len(then) == len(now):
-        for number, (old, new) in enumerate(zip(then, now, strict=True)):
+        for number, (old, new) in enumerate(zip(then, now, strict=True), 1):
             name = new.get("name", number) if isinstance(new, dict) else number
             yield from _differing(old, new, f"{place}[{name}]")
     elif then != now:

@@ -5,7 +5,6 @@ axis d [ZK 6]; with a bedding angle θ the axis is tilted from the vertical by �
 bedding planes dip by θ that way.
 """
 
-import re
 from collections.abc import Mapping
 from functools import singledispatch
 from pathlib import Path
@@ -174,10 +173,9 @@ def _law(fabric: said.Fabric | None, preset: Any) -> Any:
     """Return the record of a fabric law, with the preset's parameters where it is the preset's law."""
     if fabric is None:
         return laws.Constant()
-    known = {_snake(record.__name__): record for record in laws.known_laws()}
-    if fabric.law not in known:
-        raise MisfitError("fabric.law", f"there is no fabric law '{fabric.law}'{suggest(fabric.law, known)}")
-    record = known[fabric.law]
+    if fabric.law not in laws.LAWS:
+        raise MisfitError("fabric.law", f"there is no fabric law '{fabric.law}'{suggest(fabric.law, laws.LAWS)}")
+    record = laws.LAWS[fabric.law]
     return changed(preset if isinstance(preset, record) else record(), fabric.parameters, "fabric.parameters")
 
 
@@ -188,7 +186,3 @@ def changed(record: Any, parameters: Mapping[str, float], place: str) -> Any:
         if name not in numbers:
             raise MisfitError(f"{place}.{name}", f"is not a known parameter{suggest(name, numbers)}")
     return record._replace(**parameters)
-
-
-def _snake(name: str) -> str:
-    return re.sub(r"(?<!^)(?=[A-Z])", "_", name).lower()

@@ -184,6 +184,17 @@ assert new.status[0] == 0 and new.state.fabric[0, 0] > 1e-5, new
 """
 
 
+COMPILED = """
+import numpy as np
+from umat.fabric import LAWS
+from umat.fabric_history import increment
+row = np.zeros((1, 31))
+row[0, 25:28] = 0.01, -0.005, -0.005
+law = LAWS["follower"]()
+np.testing.assert_allclose(increment(law, row)[0], law.h * law.critical_fabric * row[0, 25:], rtol=1e-9)
+"""
+
+
 def test_the_recipe_for_a_fabric_law(tmp_path: Path) -> None:
     """The file of CONTRIBUTING.md is put beside the other laws of a copy, imported as said, and found by its name."""
     text = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
@@ -195,6 +206,9 @@ def test_the_recipe_for_a_fabric_law(tmp_path: Path) -> None:
     assert line in init.read_text()
     init.write_text(init.read_text().replace(line, f"{line}from .follower import Follower\n"))
     environment = os.environ | {"PYTHONPATH": str(tmp_path), "NUMBA_DISABLE_JIT": "1"}
-    command = [sys.executable, "-c", CHECK]
-    done = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr
+    for check, more in ((CHECK, {}), (COMPILED, {"NUMBA_DISABLE_JIT": "0"})):
+        command = [sys.executable, "-c", check]
+        done = subprocess.run(
+            command, cwd=tmp_path, env=environment | more, capture_output=True, text=True, check=False
+        )
+        assert done.returncode == 0, done.stderr

@@ -18,6 +18,10 @@ HORIZONTAL = 1e-4
 """Angle from −90° within which an axis counts as horizontal [deg]."""
 
 
+ROUNDING = 1e-14
+"""Length of a deviator over that of its tensor below which it is rounding."""
+
+
 def ratio(above: ArrayLike, below: ArrayLike) -> Array:
     """Return above / below, NaN where below is 0."""
     above, below = np.broadcast_arrays(np.asarray(above, float), np.asarray(below, float))
@@ -25,9 +29,10 @@ def ratio(above: ArrayLike, below: ArrayLike) -> Array:
 
 
 def direction(tensor: ArrayLike) -> Array:
-    """Return the (..., 6) unit deviator s/‖s‖ of a tensor; zero where there is none."""
+    """Return the (..., 6) unit deviator s/‖s‖ of a tensor; zero where there is none but rounding."""
     s = deviator(tensor)
-    return np.nan_to_num(ratio(s, norm(s)[..., None]))
+    length = norm(s)[..., None]
+    return np.where(length > ROUNDING * norm(tensor)[..., None], np.nan_to_num(ratio(s, length)), 0.0)
 
 
 def deviatoric_strain(strain: ArrayLike) -> Array:

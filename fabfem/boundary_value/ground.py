@@ -10,6 +10,7 @@ from fabfem.case.stages import Geostatic, Gravity, Load
 from fabfem.fem.loads import k0_stress
 from fabfem.fem.mesh import Mesh
 from fabfem.fem.space import Space
+from umat import mandel
 from umat.mandel import Array
 
 
@@ -45,6 +46,17 @@ def ground_stress(case: BoundaryValueCase, space: Space, material: str, zone: st
     surcharge = said.surcharge + _overburden(case, space.mesh, top)
     above, below = effective_weights(case, material)
     return k0_stress(space, points, top, above, said.k0, surcharge, table_level(case), below)
+
+
+def ground_in_words(case: BoundaryValueCase, stress: Array) -> str:
+    """Return the tail of a sentence about an initial stress that a material refuses: what it is and comes from."""
+    p = stress[:, :3].mean(axis=1)
+    steepest = float(np.max(mandel.q(stress)[p > 0] / p[p > 0], initial=0.0))
+    return (
+        f" (the initial p goes from {p.min(initial=np.inf):.3g} to {p.max(initial=-np.inf):.3g} "
+        f"{case.unit_system.label('stress')}, q/p to {steepest:.3g}; "
+        "see [units], unit_weight, k0, surcharge and void_ratio)"
+    )
 
 
 def _first_stress(case: BoundaryValueCase, zone: str) -> float:

@@ -4,16 +4,17 @@ What is wrong in a case and can only be seen here (a boundary that the mesh lack
 `CaseError` with one sentence naming the place in the file.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from functools import partial
 
 import umat
 from fabfem.boundary_value.conditioning import conditioning_columns
 from fabfem.boundary_value.discretisation import FIELD, Discretisation
 from fabfem.boundary_value.errors import error_columns
 from fabfem.boundary_value.fields import known_fields, point_tensors
-from fabfem.boundary_value.ground import ground_stress, zones_of
+from fabfem.boundary_value.ground import ground_in_words, ground_stress, zones_of
 from fabfem.boundary_value.hollow_cylinder import hollow_cylinder_columns
 from fabfem.boundary_value.meshes import hash_of, mesh_of, mesh_place
 from fabfem.boundary_value.omitted import left_out
@@ -157,7 +158,7 @@ def _zones(case: BoundaryValueCase, name: str, space: Space, filling: Substance)
     for zone in zones_of(case, name, space.mesh):
         with _blamed(case, f"stage[{case.stage[0].name}]"):
             stress = ground_stress(case, space, name, zone)
-        with _blamed(case, f"material.{name}"):
+        with _blamed(case, f"material.{name}", partial(ground_in_words, case, stress)):
             state = umat.initial_state(filling.material, filling.directions, stress, **filling.needs)
         yield zone, Zone(filling.material, filling.directions, state, space.points_of(space.mesh.zone(zone)))
 
@@ -235,12 +236,12 @@ def _check_probes(case: BoundaryValueCase, zones: Mapping[str, Zone]) -> None:
 
 
 @contextmanager
-def _blamed(case: BoundaryValueCase, place: str) -> Iterator[None]:
-    """Turn a refusal of the parts into a sentence that names the place in the case."""
+def _blamed(case: BoundaryValueCase, place: str, tail: Callable[[], str] = str) -> Iterator[None]:
+    """Turn a refusal of the parts into a sentence that names the place in the case, with a tail that explains it."""
     try:
         yield
     except CaseError:
         raise
     except ValueError as error:
         where = f"{place}.{error.key}" if isinstance(error, MisfitError) else place
-        raise CaseError(f"{case.path.name}: {where}: {str(error).rstrip('.')}") from error
+        raise CaseError(f"{case.path.name}: {where}: {str(error).rstrip('.')}{tail()}") from error

@@ -7,7 +7,7 @@ from pydantic import Field
 from fabfem.case.mesh import Mesh
 from fabfem.case.schema import AnyScene, Case
 from fabfem.case.stages import AnyStage, Component, Support
-from fabfem.case.table import Factors, Identifier, Names, NotNegative, Positive, Table, Text
+from fabfem.case.table import Factors, Identifier, Names, NotNegative, Table, Text
 from fabfem.case.water import Water
 
 
@@ -23,7 +23,7 @@ class Scene(AnyScene):
 class Solver(Table):
     """Solution of the equilibrium equations."""
 
-    tolerance: Positive = 1e-6
+    tolerance: Annotated[float, Field(gt=0, le=0.1)] = 1e-6
     """Largest out-of-balance force over the size of the forces in play."""
     iterations: Annotated[int, Field(ge=1)] = 16
     """Most iterations of an increment before it is cut."""

@@ -14,6 +14,7 @@ def contradictions(case: BoundaryValueCase) -> Iterator[tuple[str, str]]:
     yield from _unknown_components(case)
     yield from _repeated_names(case)
     yield from _impossible_together(case)
+    yield from _half_of_an_inclined_bedding(case)
     yield from _odd_columns(case)
     yield from _odd_zones(case)
     yield from _odd_water(case)
@@ -93,6 +94,19 @@ def _impossible_together(case: BoundaryValueCase) -> Iterator[tuple[str, str]]:
         fabric = material.fabric if isinstance(material, ChangHicher) else None
         if fabric and fabric.bedding_angle and case.scene.kinematics.startswith("axisymmetric"):
             yield f"material.{name}.fabric.bedding_angle", "must be 0: inclined bedding has no axis of symmetry"
+
+
+def _half_of_an_inclined_bedding(case: BoundaryValueCase) -> Iterator[tuple[str, str]]:
+    """Yield beddings that a plane of symmetry, known by its name, does not mirror onto themselves."""
+    plane = any("symmetry" in support.boundary for support in case.support)
+    for name, material in case.material.items():
+        fabric = material.fabric if isinstance(material, ChangHicher) else None
+        if plane and fabric and fabric.norm and fabric.bedding_angle % 90 and case.scene.kinematics == "plane_strain":
+            what = (
+                f"a bedding at {fabric.bedding_angle:g} degrees is no mirror image of itself, but a [[support]] holds "
+                "the boundary 'symmetry': model both halves (the starter's footing_mesh.py draws them with whole = 1)"
+            )
+            yield f"material.{name}.fabric.bedding_angle", what
 
 
 def _unknown_strength(case: BoundaryValueCase) -> Iterator[tuple[str, str]]:

@@ -71,7 +71,8 @@ def case_from(tables: dict[str, Any], path: str | Path = "case.toml") -> Case:
     try:
         case = kind.schema().model_validate(tables)
     except ValidationError as error:
-        raise CaseError(f"{path.name}: {sentence(error, tables)}") from error
+        what = _table_of_another_kind(tables, kind) or sentence(error, tables)
+        raise CaseError(f"{path.name}: {what}") from error
     case._path = path
     for where, what in kind.contradictions(case):
         raise CaseError(f"{path.name}: {where}: {what}")
@@ -88,6 +89,17 @@ def _kind(tables: dict[str, Any], path: Path) -> str:
         known = ", ".join(f"'{name}'" for name in KINDS)
         raise CaseError(f"{path.name}: scene.kind: must be one of {known} (got {kind!r}){suggest(str(kind), KINDS)}")
     return kind
+
+
+def _table_of_another_kind(tables: dict[str, Any], kind: Kind) -> str | None:
+    """Return a sentence on the first table that only other kinds of scene have, or None."""
+    for key in tables:
+        if key not in kind.schema().model_fields:
+            kinds = [name for name, other in KINDS.items() if key in other.schema().model_fields]
+            if kinds:
+                said = next(name for name, other in KINDS.items() if other is kind)
+                return f"{key}: belongs to a scene of kind {' or '.join(kinds)}, and scene.kind is {said}"
+    return None
 
 
 def resolved(case: Case) -> str:
@@ -114,7 +126,7 @@ def _plain(value: Any) -> Any:
 def read_tables(path: Path) -> dict[str, Any]:
     """Return the tables of a TOML file as they stand; `CaseError` if it cannot be read."""
     try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
+        return tomllib.loads(path.read_text(encoding="utf-8-sig"))
     except FileNotFoundError:
         raise CaseError(f"{path}: there is no such file{_beside(path)}") from None
     except OSError as error:

@@ -39,7 +39,7 @@ def _keys(options: argparse.Namespace) -> int:
 
     found = keys(options.place)
     if not found:
-        places = {table.place.strip("[]") for table in keys()}
+        places = {table.place.strip("[]") for table in keys()} - {""}
         return fail(f"a case has no table '{options.place}'{suggest(options.place, places)}", BAD_INPUT)
     if not options.quiet:
         names = list(_names()) if options.markdown or not options.place else []

@@ -51,6 +51,8 @@ def _solve(options: argparse.Namespace) -> int:
     outcome = run_case(case, folder, quiet=options.quiet, restart=restart)
     if first() and not options.quiet:
         print(outcome.summary(_error_class(case)))
+        if options.branch and outcome.status == "completed" and not outcome.increments:
+            print(f"nothing was left to run: {options.branch} had come to the end of the last stage; add a stage")
     if outcome.status == "completed":
         if not launched() and not watch.compiled:  # what only the first run of all costs is no price
             remember_cost(case, outcome.folder)

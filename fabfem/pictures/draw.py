@@ -88,6 +88,8 @@ def _shear(plotter: pyvista.Plotter, grid: pyvista.UnstructuredGrid) -> Drawn:
         shown = grid.point_data.get("displacement", np.zeros((grid.n_points, 3)))
         grid["shear"], title = np.linalg.norm(shown, axis=1), "displacement"
     upper = max(float(np.nanpercentile(grid["shear"], SATURATED)), 1e-12)
+    if "strain" in grid.point_data and float(np.nanmax(grid["shear"])) > upper:
+        title += f"; darkest at {upper:.3g} and above, the most is {float(np.nanmax(grid['shear'])):.3g}"
     bounds = busy(grid, upper)
     surface = _cropped(grid.extract_surface(nonlinear_subdivision=2, algorithm="dataset_surface"), bounds)
     colours = span(0.0, upper)

@@ -212,7 +212,7 @@ def _label(curves: Curves, name: str) -> str:
 
 
 def _words(name: str) -> str:
-    return name.replace("_", " ")
+    return "peak stress ratio" if name == "peak" else name.replace("_", " ")
 
 
 def _saved(figure: Figure, path: Path) -> Path:

@@ -52,6 +52,17 @@ BAD = {
     "fraction of a count": ("every = 5", "every = 2.5", "output.every: must be a whole number (got 2.5)"),
     "increments out of order": ("initial = 0.01", "initial = 0.5", "must satisfy minimum <= initial <= maximum"),
     "name given twice": ('"settlement"\nkind', '"geostatic"\nkind', "stage: the name 'geostatic' is given 2 times"),
+    "tolerance that any forces meet": ("tolerance = 3e-3", "tolerance = 1.0", "solver.tolerance: must be at most 0.1"),
+    "inclined bedding in a symmetric half": (
+        "bedding_angle = 0.0",
+        "bedding_angle = 60.0",
+        "material.sand.fabric.bedding_angle: a bedding at 60 degrees is no mirror image of itself",
+    ),
+    "table of another kind of scene": (
+        "[mesh]",
+        "[initial]\np = 50.0\n\n[mesh]",
+        "initial: belongs to a scene of kind element, and scene.kind is boundary_value",
+    ),
     "not TOML": ("[mesh]", "[mesh", "is not valid TOML"),
     "wrong component names": (
         'kinematics = "plane_strain"',
@@ -78,6 +89,18 @@ def test_bad_input_gets_a_sentence_naming_the_place(name: str, tmp_path: Path) -
     assert sentence.startswith("case.toml: ")
     assert expected in sentence
     assert "\n" not in sentence
+
+
+@pytest.mark.parametrize(("angle", "norm"), [(0, 0.208), (90, 0.208), (-180, 0.208), (60, 0.0)])
+def test_a_bedding_that_mirrors_onto_itself_needs_one_half(angle: float, norm: float) -> None:
+    tables = tomllib.loads(FOOTING)
+    tables["material"]["sand"]["fabric"] |= {"bedding_angle": float(angle), "norm": norm}
+    case_from(tables)
+
+
+def test_a_byte_order_mark_is_no_part_of_the_case(tmp_path: Path) -> None:
+    (tmp_path / "case.toml").write_text(FOOTING, encoding="utf-8-sig")
+    assert case_from(tomllib.loads(FOOTING), tmp_path / "case.toml") == read_case(tmp_path / "case.toml")
 
 
 def test_an_empty_list_is_printed_where_it_says_something() -> None:

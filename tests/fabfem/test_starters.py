@@ -46,6 +46,48 @@ def test_a_starter_runs_and_is_right(
     assert low < float(rows[-1][headers.index(column)]) < high
 
 
+def test_the_footing_is_changed_to_a_whole_one_as_its_comments_say(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Whole, it carries what the half does, and less where the bedding is steep."""
+    monkeypatch.chdir(tmp_path)
+    assert main(["new", "footing", "--quiet"]) == DONE
+    half = (tmp_path / "footing.toml").read_text(encoding="utf-8").replace("-0.05 }", "-0.02 }")
+    whole = half.replace("elements = 3 }", "elements = 3, whole = 1 }").replace('["symmetry", "side"]', '"side"')
+    whole = whole.replace("scale = -2.0", "scale = -1.0")
+    inclined = whole.replace("bedding_angle = 0.0", "bedding_angle = 60.0")
+    forces = {}
+    for name, text in {"half": half, "whole": whole, "inclined": inclined}.items():
+        (tmp_path / f"{name}.toml").write_text(text, encoding="utf-8")
+        assert main(["solve", f"{name}.toml", "--quiet"]) == DONE
+        headers, rows = read_history(tmp_path / "results" / name / "history.csv")
+        forces[name] = float(rows[-1][headers.index("force [kN/m]")])
+    assert forces["whole"] == pytest.approx(forces["half"], rel=5e-3)  # the tolerance of the case is 3e-3
+    assert forces["inclined"] < 0.99 * forces["whole"]
+
+
+@pytest.mark.parametrize("wrong", ["width = -1.0", "width = 10.0", "elements = 2.5", "elements = 0", "depth = 0.0"])
+def test_a_footing_that_cannot_be_drawn(wrong: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["new", "footing", str(tmp_path), "--quiet"]) == DONE
+    case, key = tmp_path / "footing.toml", wrong.split()[0]
+    said = {"width": "width = 1.0", "elements": "elements = 3", "depth": "depth = 4.0"}[key]
+    text = case.read_text(encoding="utf-8")
+    assert said in text
+    case.write_text(text.replace(said, wrong), encoding="utf-8")
+    assert main(["check", str(case), "--quiet"]) == BAD_INPUT
+    assert "drew no mesh: it needs 0 < width/2 < reach" in capsys.readouterr().err
+
+
+def test_a_refused_initial_stress_is_shown(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["new", "footing", str(tmp_path), "--quiet"]) == DONE
+    case = tmp_path / "footing.toml"
+    case.write_text(case.read_text(encoding="utf-8").replace("k0 = 0.5", "k0 = 50.0"), encoding="utf-8")
+    assert main(["check", str(case), "--quiet"]) == BAD_INPUT
+    said = capsys.readouterr().err
+    assert "q/p to 1.4" in said  # (50 − 1)/(2·50/3 + 1/3), horizontal over vertical
+    assert "kPa" in said
+
+
 def test_a_starter_overwrites_nothing(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "footing_mesh.py").write_text("mine")
     assert main(["new", "footing", str(tmp_path)]) == BAD_INPUT

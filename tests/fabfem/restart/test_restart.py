@@ -110,7 +110,7 @@ def torn(tmp_path: Path) -> Path:
 COARSE = {"mesh": {"box": {"cells": [2, 2], "lower": [0.0, -1.0], "upper": [1.5, 0.0]}}}
 CHANGES = {
     "material": (scene(MOHR | {"cohesion": 3.0}, pushed()), "material.soil.cohesion was 2.0 and is 3.0"),
-    "stage": (scene(MOHR, pushed(0.03)), "stage[push].displacement[0].y was -0.02 and is -0.03"),
+    "stage": (scene(MOHR, pushed(0.03)), "stage[push].displacement[1].y was -0.02 and is -0.03"),
     "mesh": (scene(MOHR, pushed()) | COARSE, "mesh"),
 }
 
