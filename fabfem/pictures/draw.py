@@ -88,11 +88,11 @@ def _shear(plotter: pyvista.Plotter, grid: pyvista.UnstructuredGrid) -> Drawn:
         shown = grid.point_data.get("displacement", np.zeros((grid.n_points, 3)))
         grid["shear"], title = np.linalg.norm(shown, axis=1), "displacement"
     upper = max(float(np.nanpercentile(grid["shear"], SATURATED)), 1e-12)
-    if "strain" in grid.point_data and float(np.nanmax(grid["shear"])) > upper:
-        title += f"; darkest at {upper:.3g} and above, the most is {float(np.nanmax(grid['shear'])):.3g}"
+    colours, most = span(0.0, upper), float(np.nanmax(grid["shear"]))
+    if "strain" in grid.point_data and most > colours[1]:
+        title += f"; darkest at {colours[1]:.4g} and above, the most is {most:.3g}"
     bounds = busy(grid, upper)
     surface = _cropped(grid.extract_surface(nonlinear_subdivision=2, algorithm="dataset_surface"), bounds)
-    colours = span(0.0, upper)
     body = plotter.add_mesh(
         surface, scalars="shear", cmap="OrRd", clim=colours, scalar_bar_args=_bar(title), lighting=False
     )
