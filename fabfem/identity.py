@@ -1,6 +1,7 @@
 """What decides the numbers of a run: the case with all defaults, the files that it names, and the program.
 
-Two runs with the same identity on the same machine give the same numbers to the last bit.
+Two runs with the same identity on the same machine give the same numbers to the last bit, as long as the cache of
+compiled kernels is kept: compiled once more, after others in one process, a kernel may round differently.
 """
 
 import hashlib
