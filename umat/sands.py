@@ -70,4 +70,7 @@ def _in_units(sand: ChangHicher, newtons: float, metres: float) -> ChangHicher:
     )
 
 
+#: Void ratio of the densest and the loosest packing of a sand [ZK §5.1]
+PACKINGS: dict[str, tuple[float, float]] = {"toyoura": (0.597, 0.977)}
+
 SANDS: dict[str, Callable[..., ChangHicher]] = {"toyoura": toyoura, "dem_yang_wu": dem_yang_wu}

@@ -51,6 +51,7 @@ def _solve(options: argparse.Namespace) -> int:
     outcome = run_case(case, folder, quiet=options.quiet, restart=restart)
     if first() and not options.quiet:
         print(outcome.summary(_error_class(case)))
+        _print_remarks(case)
         if options.branch and outcome.status == "completed" and not outcome.increments:
             print(f"nothing was left to run: {options.branch} had come to the end of the last stage; add a stage")
     if outcome.status == "completed":
@@ -58,6 +59,14 @@ def _solve(options: argparse.Namespace) -> int:
             remember_cost(case, outcome.folder)
         return DONE
     return fail(outcome.reason, INTERRUPTED if outcome.status == "interrupted" else STOPPED)
+
+
+def _print_remarks(case: "Case", prefix: str = "") -> None:
+    """Print what is odd about a case."""
+    from fabfem.remarks import remarks
+
+    for remark in remarks(case):
+        print(f"{prefix}remark: {remark}")
 
 
 def _error_class(case: "Case") -> str:
@@ -85,6 +94,7 @@ def _check(options: argparse.Namespace) -> int:
         print(resolved(case))
         print("# What the scene leaves out:", *description.omitted, sep="\n#   ")
         print("# What remains:\n" + summary((*description.remains, *time), prefix="#   "))
+        _print_remarks(case, prefix="# ")
     return DONE
 
 
