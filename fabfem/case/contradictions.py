@@ -101,7 +101,8 @@ def _half_of_an_inclined_bedding(case: BoundaryValueCase) -> Iterator[tuple[str,
     plane = any("symmetry" in support.boundary for support in case.support)
     for name, material in case.material.items():
         fabric = material.fabric if isinstance(material, ChangHicher) else None
-        if plane and fabric and fabric.norm and fabric.bedding_angle % 90 and case.scene.kinematics == "plane_strain":
+        across = fabric and fabric.norm and fabric.bedding_angle % 90 and (fabric.azimuth - 90) % 180
+        if plane and fabric and across and case.scene.kinematics == "plane_strain":
             what = (
                 f"a bedding at {fabric.bedding_angle:g} degrees is no mirror image of itself, but a [[support]] holds "
                 "the boundary 'symmetry': model both halves (the starter's footing_mesh.py draws them with whole = 1)"

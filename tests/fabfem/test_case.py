@@ -91,11 +91,23 @@ def test_bad_input_gets_a_sentence_naming_the_place(name: str, tmp_path: Path) -
     assert "\n" not in sentence
 
 
-@pytest.mark.parametrize(("angle", "norm"), [(0, 0.208), (90, 0.208), (-180, 0.208), (60, 0.0)])
-def test_a_bedding_that_mirrors_onto_itself_needs_one_half(angle: float, norm: float) -> None:
+@pytest.mark.parametrize(
+    ("angle", "azimuth", "norm", "mirrored"),
+    [
+        *[(0, 0, 0.208, True), (90, 0, 0.208, True), (-180, 0, 0.208, True), (60, 0, 0.0, True)],
+        *[(30, 90, 0.208, True), (30, -90, 0.208, True), (30, 0, 0.208, False), (30, 45, 0.208, False)],
+    ],
+)
+def test_a_bedding_that_mirrors_onto_itself_needs_one_half(
+    angle: float, azimuth: float, norm: float, mirrored: bool
+) -> None:
     tables = tomllib.loads(FOOTING)
-    tables["material"]["sand"]["fabric"] |= {"bedding_angle": float(angle), "norm": norm}
-    case_from(tables)
+    tables["material"]["sand"]["fabric"] |= {"bedding_angle": float(angle), "azimuth": float(azimuth), "norm": norm}
+    if mirrored:
+        assert case_from(tables).material["sand"].fabric.bedding_angle == angle
+    else:
+        with pytest.raises(CaseError, match="no mirror image of itself"):
+            case_from(tables)
 
 
 def test_a_byte_order_mark_is_no_part_of_the_case(tmp_path: Path) -> None:

@@ -43,11 +43,11 @@ def test_pictures_are_drawn(copied: Path) -> None:
 def test_the_labels_of_colours_are_round_and_tell_values_apart(
     low: float, high: float, first: float, last: float
 ) -> None:
-    draw = pytest.importorskip("fabfem.pictures.draw")
-    found = draw.span(low, high)
+    frame = pytest.importorskip("fabfem.pictures.frame")
+    found = frame.span(low, high)
     assert found == pytest.approx((first, last))
-    labels = [f"{value:.4g}" for value in np.linspace(*found, draw.LABELS + 1)]
-    assert len(set(labels)) == draw.LABELS + 1
+    labels = [f"{value:.4g}" for value in np.linspace(*found, frame.LABELS + 1)]
+    assert len(set(labels)) == frame.LABELS + 1
 
 
 def test_a_twisted_section_is_drawn_in_its_plane() -> None:
