@@ -56,6 +56,8 @@ def with_zones(mesh: Mesh, parts: Mapping[str, Region]) -> Mesh:
     MeshError
         Where a name is taken or a part is empty, or the region has other axes than the mesh.
     """
+    if not parts:
+        return mesh
     zones = dict(mesh.zones)
     centres = mesh.points[mesh.cells[:, : len(mesh.element.corners)]].mean(axis=1)
     for name, region in parts.items():
